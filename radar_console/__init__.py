@@ -1,0 +1,1 @@
+"""A radar tracking console: from antenna to screen."""

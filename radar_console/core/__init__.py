@@ -1,0 +1,1 @@
+"""What every other part speaks: messages, geometry, units and errors."""

@@ -1,0 +1,1 @@
+"""The console: the only folder, with the app, that imports Qt."""

@@ -1,0 +1,1 @@
+"""Motion, filters and densities: pure, batched over leading axes."""

@@ -1,0 +1,1 @@
+"""Plot tables, read and written."""

@@ -1,0 +1,1 @@
+"""From centroids to tracks."""
