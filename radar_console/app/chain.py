@@ -1,0 +1,95 @@
+"""The chain behind a source: clustering, tracker, and what is measured on the way."""
+
+import time
+from collections import defaultdict
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, field
+
+from radar_console import pipeline
+from radar_console.app.opening import Opened
+from radar_console.core.geometry import Array
+from radar_console.core.messages import Sector, TrackStatus
+from radar_console.core.units import TURN
+from radar_console.pipeline import Gauge, Pace, Policy
+
+
+@dataclass
+class Tally:
+    """Counts and times of a run, for `--stats` and the text status."""
+
+    plots: int = 0
+    centroids: int = 0
+    confirmed: set[int] = field(default_factory=set)
+    live: dict[int, int] = field(default_factory=dict)
+    data_time: float = 0.0
+    tracker_s: defaultdict[int, float] = field(default_factory=lambda: defaultdict(float))
+    latency_s: list[Array] = field(default_factory=list)
+
+    def take(self, sector: Sector) -> None:
+        """Count what a sector brought at the end of the chain."""
+        self.data_time = sector.stop
+        self.plots += len(sector.plots) if len(sector.plots) else len(sector.centroids)
+        self.centroids += len(sector.centroids)
+        tracks = sector.tracks
+        if not len(tracks):
+            return
+        self.latency_s.append(sector.stop - tracks["plot_time"][tracks["hit"]])
+        for number, status in zip(tracks["track"].tolist(), tracks["status"].tolist(), strict=True):
+            if status == TrackStatus.DELETED:
+                self.live.pop(number, None)
+                continue
+            self.live[number] = status
+            if status == TrackStatus.CONFIRMED:
+                self.confirmed.add(number)
+
+    @property
+    def turns(self) -> int:
+        """Turns of the antenna so far."""
+        return len(self.tracker_s)
+
+    def live_with(self, *statuses: TrackStatus) -> int:
+        """How many tracks live now with one of these statuses."""
+        return sum(status in statuses for status in self.live.values())
+
+
+@dataclass
+class Chain:
+    """A source with its stages, ready to run once."""
+
+    opened: Opened
+    tally: Tally = field(default_factory=Tally)
+    gauge: Gauge = field(default_factory=Gauge)
+
+    def __post_init__(self) -> None:
+        from radar_console.plots.clustering import Clustering
+        from radar_console.tracker.stage import Tracker
+
+        settings = self.opened.settings
+        self.clustering = Clustering(settings.plots, settings.radar)
+        self.tracker = Tracker(settings.tracker, self.opened.source.radar, self.opened.seed)
+
+    def run(
+        self, threads: bool = False, pace: Pace | None = None, policy: Policy = Policy.BLOCK
+    ) -> Iterator[Sector]:
+        """Sectors with their tracks, counted in `tally`."""
+        source: Iterable[Sector] = self.opened.source.sectors()
+        if pace is not None:
+            source = pace(source)
+        stages = (self.clustering, self._timed_tracker)
+        run = (
+            pipeline.threaded(source, *stages, policy=policy, gauge=self.gauge)
+            if threads
+            else pipeline.inline(source, *stages)
+        )
+        for sector in run:
+            self.tally.take(sector)
+            yield sector
+
+    def _timed_tracker(self, sectors: Iterable[Sector]) -> Iterator[Sector]:
+        """The tracker stage, its time added up for each turn of the antenna."""
+        for sector in sectors:
+            began = time.perf_counter()
+            done = self.tracker.push(sector)
+            self.tally.tracker_s[int(sector.begin // TURN)] += time.perf_counter() - began
+            yield done
+        yield from self.tracker.flush()

@@ -1,0 +1,259 @@
+"""The command line."""
+
+import logging
+import os
+import sys
+from pathlib import Path
+from typing import Annotated, Any
+
+import click
+import typer
+from typer.core import TyperGroup
+
+from radar_console.core.errors import RadarConsoleError
+
+
+class _ConsoleByDefault(TyperGroup):
+    """`radar-console SOURCE` is `radar-console console SOURCE`."""
+
+    def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
+        first = args[0] if args else ""
+        if first not in self.commands and first not in ("--help", "--version"):
+            args = ["console", *args]
+        return super().parse_args(ctx, args)
+
+
+app = typer.Typer(
+    cls=_ConsoleByDefault,
+    add_completion=False,
+    rich_markup_mode="rich",
+    no_args_is_help=False,
+    pretty_exceptions_enable=False,
+    epilog="Examples:  radar-console  ·  radar-console scenarios/harbour.toml  ·  "
+    "radar-console flight.pcap --speed 20  ·  radar-console track flight.pcap -o tracks.csv",
+)
+
+SourceArgument = Annotated[
+    str,
+    typer.Argument(
+        metavar="SOURCE",
+        help="Scenario (.toml, or the name of one that comes along), ASTERIX recording (.pcap, .ast) "
+        "or plot table (.csv).",
+        show_default=False,
+    ),
+]
+ConfigOption = Annotated[
+    Path | None,
+    typer.Option(metavar="SCENARIO", help="Scenario file with [radar], [plots], [tracker] for a recording."),
+]
+SeedOption = Annotated[int | None, typer.Option(min=0, help="Instead of the scenario's seed.")]
+RadarOption = Annotated[
+    str | None,
+    typer.Option("--radar", metavar="SAC/SIC", help="Which radar, such as 226/232."),
+]
+
+
+def _sac_sic(text: str | None) -> tuple[int, int] | None:
+    if text is None:
+        return None
+    parts = text.split("/")
+    if len(parts) != 2 or not all(part.isdigit() and int(part) < 256 for part in parts):
+        raise RadarConsoleError(f"--radar {text}: expected two numbers from 0 to 255, such as 226/232")
+    return int(parts[0]), int(parts[1])
+
+
+def _version(wanted: bool) -> None:
+    if wanted:
+        from importlib.metadata import version
+
+        typer.echo(f"radar-console {version('radar-console')}")
+        raise typer.Exit
+
+
+@app.callback()
+def _root(
+    version: Annotated[
+        bool, typer.Option("--version", callback=_version, is_eager=True, help="Print the version.")
+    ] = False,
+) -> None:
+    """A radar tracking console: from antenna to screen, on simulated and on recorded radar.
+
+    Without a command it opens the console: [bold]radar-console [SOURCE][/bold].
+    """
+
+
+@app.command(
+    epilog="Examples:  radar-console  ·  radar-console harbour  ·  radar-console flight.pcap --speed 20  ·  "
+    "radar-console twenty-five --screenshot picture.png --after 120"
+)
+def console(
+    source: Annotated[
+        str | None,
+        typer.Argument(
+            metavar="[SOURCE]",
+            help="Scenario (.toml, or the name of one that comes along), ASTERIX recording (.pcap, .ast) "
+            "or plot table (.csv). Without it: the demo.",
+            show_default=False,
+        ),
+    ] = None,
+    config: ConfigOption = None,
+    seed: SeedOption = None,
+    radar: RadarOption = None,
+    speed: Annotated[float, typer.Option(min=0.1, max=1000, help="Times real time.")] = 1.0,
+    user_map: Annotated[
+        Path | None, typer.Option("--map", metavar="FILE.geojson", help="Your own map on top of the coast.")
+    ] = None,
+    screenshot: Annotated[
+        Path | None, typer.Option(metavar="FILE.png", help="Render off-screen, write the picture and end.")
+    ] = None,
+    after: Annotated[
+        float | None,
+        typer.Option(min=0, metavar="SECONDS", help="Data time of the picture (default: the end)."),
+    ] = None,
+    size: Annotated[str, typer.Option(metavar="WIDTHxHEIGHT", help="Size of the picture.")] = "1680x1000",
+    verbose: Annotated[bool, typer.Option("--verbose", "-v", help="Say how long the start took.")] = False,
+) -> None:
+    """Open the console on a source."""
+    from radar_console.app import console as live
+    from radar_console.app.opening import open_source
+
+    logging.basicConfig(level=logging.INFO if verbose else logging.WARNING, format="%(message)s")
+    opened = open_source(source, config, seed, _sac_sic(radar))
+    if screenshot is not None:
+        live.screenshot(opened, screenshot, after, _size(size), user_map)
+    elif live.display_missing():
+        file = Path("radar-console.png")
+        typer.echo(
+            "No display here (neither DISPLAY nor WAYLAND_DISPLAY is set): "
+            "running without a window, as fast as it can.",
+            err=True,
+        )
+        live.screenshot(opened, file, after, _size(size), user_map)
+        typer.echo(f"The picture of the console is in {file.resolve()}")
+    else:
+        raise typer.Exit(live.run(opened, speed, user_map))
+
+
+def _size(text: str) -> tuple[int, int]:
+    width, _, height = text.partition("x")
+    if not (
+        width.isdigit() and height.isdigit() and 200 <= int(width) <= 8000 and 200 <= int(height) <= 8000
+    ):
+        raise RadarConsoleError(
+            f"--size {text}: expected WIDTHxHEIGHT in pixels, 200 to 8000, such as 1680x1000"
+        )
+    return int(width), int(height)
+
+
+@app.command(
+    epilog="Examples:  radar-console track twenty-five -o tracks.csv  ·  "
+    "radar-console track flight.pcap -o tracks.csv --stats stats.json --config site.toml"
+)
+def track(
+    source: SourceArgument,
+    output: Annotated[
+        Path, typer.Option("--output", "-o", metavar="tracks.csv", help="Where the tracks go.")
+    ],
+    config: ConfigOption = None,
+    stats: Annotated[Path | None, typer.Option(metavar="stats.json", help="Figures of the run.")] = None,
+    seed: SeedOption = None,
+    radar: RadarOption = None,
+    threaded: Annotated[
+        bool, typer.Option("--threaded", help="Each stage in a thread of its own; the same tracks.")
+    ] = False,
+) -> None:
+    """Track a source without a window, as fast as it can be read."""
+    from radar_console.app import headless
+    from radar_console.app.opening import open_source
+
+    figures = headless.track(open_source(source, config, seed, _sac_sic(radar)), output, stats, threaded)
+    _report(figures, output)
+
+
+def _report(figures: dict[str, Any], output: Path) -> None:
+    skipped = sum(figures["skipped"].values())
+    typer.echo(
+        f"{figures['scans']} scans, {figures['plots']:,} plots, {figures['centroids']:,} centroids, "
+        f"{figures['tracks_confirmed']} tracks confirmed, {skipped:,} skipped, "
+        f"{figures['wall_s']:.1f} s → {output}",
+        err=True,
+    )
+    for reason, count in sorted(figures["skipped"].items()):
+        typer.echo(f"  skipped {count:,}: {reason}", err=True)
+
+
+@app.command(
+    epilog="Examples:  radar-console simulate twenty-five -o plots.csv  ·  "
+    "radar-console simulate harbour -o plots.csv --truth truth.csv --seed 7"
+)
+def simulate(
+    scenario: Annotated[str, typer.Argument(metavar="SCENARIO", help="Scenario file, or the name of one.")],
+    output: Annotated[Path, typer.Option("--output", "-o", metavar="FILE.csv", help="Where the plots go.")],
+    truth: Annotated[
+        Path | None, typer.Option(metavar="truth.csv", help="Where the targets are, once a second.")
+    ] = None,
+    seed: SeedOption = None,
+) -> None:
+    """Write the plots that the radar of a scenario sees."""
+    from radar_console.app import headless
+    from radar_console.app.opening import open_source
+
+    opened = open_source(scenario, seed=seed)
+    if opened.truth is None:
+        raise RadarConsoleError(f"{scenario}: is a {opened.kind}; expected a scenario (.toml)")
+    plots, rows = headless.simulate(opened, output, truth)
+    typer.echo(
+        f"{plots:,} plots → {output}" + (f", {rows:,} truth rows → {truth}" if truth else ""), err=True
+    )
+
+
+@app.command(epilog="Examples:  radar-console info flight.pcap  ·  radar-console info harbour")
+def info(source: SourceArgument, config: ConfigOption = None, radar: RadarOption = None) -> None:
+    """Say what a source holds."""
+    from radar_console.app.opening import open_source
+
+    opened = open_source(source, config, None, _sac_sic(radar))
+    facts = opened.source.facts()
+    width = max(len(label) for label, _ in facts)
+    for label, value in facts:
+        typer.echo(f"{label:<{width}}  {value}")
+
+
+@app.command(epilog="Example:  radar-console scenarios")
+def scenarios() -> None:
+    """List the scenarios that come along; open one by its name."""
+    from radar_console import scenario
+    from radar_console.app import opening
+
+    known = opening.scenarios()
+    width = max(map(len, known), default=0)
+    for name, file in known.items():
+        typer.echo(f"{name:<{width}}  {scenario.load(file).title}")
+
+
+@app.command(epilog="Example:  radar-console schema > scenario.schema.json")
+def schema() -> None:
+    """Print the JSON Schema of scenario files, for completion in an editor."""
+    from radar_console import scenario
+
+    typer.echo(scenario.json_schema(), nl=False)
+
+
+@app.command("warm-up", hidden=True)
+def warm_up() -> None:
+    """Compile what is compiled, so that the first start is quick."""
+    from radar_console.app.warming import warm_up as warm
+
+    warm()
+
+
+def main() -> None:
+    """Run the command line; exit code 2 for what the user can mend, 130 when interrupted."""
+    try:
+        app()
+    except RadarConsoleError as error:
+        typer.echo(f"radar-console: {error}", err=True)
+        sys.exit(2)
+    except BrokenPipeError:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        sys.exit(1)

@@ -1,0 +1,125 @@
+"""Open whatever the user names: a scenario, a recording, a plot table."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Protocol
+
+import numpy as np
+
+from radar_console import pipeline, scenario
+from radar_console.core.errors import InputError
+from radar_console.core.messages import Radar, Table
+from radar_console.scenario import Configuration
+
+DEMO = "twenty-five"
+ASTERIX_SUFFIXES = (".pcap", ".pcapng", ".ast")
+EXPECTED = "expected a scenario (.toml), an ASTERIX recording (.pcap, .ast) or a plot table (.csv)"
+
+
+class Source(pipeline.Source, Protocol):
+    """A source that can also say what it holds."""
+
+    def facts(self) -> list[tuple[str, str]]:
+        """Label and value, for `radar-console info`."""
+        ...
+
+
+@dataclass(frozen=True)
+class Opened:
+    """A source, and the settings of the stages behind it.
+
+    Attributes
+    ----------
+    title : for the screen
+    kind : "simulation", "recording" or "plot table"
+    truth : where the targets are at a time, s; None if nobody knows
+    seed : of the tracker
+    """
+
+    source: Source
+    settings: Configuration
+    title: str
+    kind: str
+    truth: Callable[[float], Table] | None
+    seed: int
+
+
+def scenarios() -> dict[str, Path]:
+    """The scenario files that come along, by name."""
+    here = Path(__file__).resolve()
+    # In a wheel they lie in the package, in a checkout beside it.
+    folders = (here.parents[1] / "scenarios", here.parents[2] / "scenarios")
+    folder = next((f for f in folders if (f / f"{DEMO}.toml").is_file()), folders[0])
+    return {file.stem: file for file in sorted(folder.glob("*.toml"))}
+
+
+def open_source(
+    name: str | None,
+    config: Path | None = None,
+    seed: int | None = None,
+    sac_sic: tuple[int, int] | None = None,
+) -> Opened:
+    """Open a source by the name that the user typed; without one, the demo.
+
+    Parameters
+    ----------
+    name : a file, or the name of a scenario that comes along
+    config : a scenario file whose [radar], [plots], [tracker] and [display] apply to a recording
+    seed : in place of the scenario's
+    sac_sic : which radar of a recording
+
+    Raises
+    ------
+    InputError, ScenarioError   the file or its content is not what was expected
+    """
+    file = _find(name or DEMO)
+    suffix = file.suffix.lower()
+    if suffix == ".toml":
+        return _simulation(file, config, seed)
+    given = frozenset[str]()
+    settings = Configuration()
+    if config is not None:
+        settings, given = scenario.load_configuration(_find(str(config)))
+    if suffix in ASTERIX_SUFFIXES:
+        from radar_console.asterix.source import AsterixRecording
+
+        recording = AsterixRecording(file, sac_sic, **_radar_overrides(settings, given))
+        return Opened(recording, settings, file.name, "recording", None, seed or 0)
+    if suffix == ".csv":
+        from radar_console.recording.table import PlotTable
+
+        table = PlotTable(file, **_radar_overrides(settings, given))
+        return Opened(table, settings, file.name, "plot table", None, seed or 0)
+    raise InputError(file, "", f"unknown kind of file; {EXPECTED}")
+
+
+def _find(name: str) -> Path:
+    file = Path(name)
+    if file.is_file():
+        return file
+    known = scenarios()
+    if name in known:
+        return known[name]
+    if file.is_dir():
+        raise InputError(file, "", f"is a folder; {EXPECTED}")
+    raise InputError(file, "", f"no such file; {EXPECTED}, or one of: {', '.join(known)}")
+
+
+def _simulation(file: Path, config: Path | None, seed: int | None) -> Opened:
+    from radar_console.simulator.radar import Simulator
+
+    if config is not None:
+        raise InputError(config, "", "--config goes with a recording; a scenario brings its own settings")
+    settings = scenario.load(file)
+    seed = settings.seed if seed is None else seed
+    simulator = Simulator(settings, np.random.default_rng(seed), file)
+    own = Configuration(
+        radar=settings.radar, plots=settings.plots, tracker=settings.tracker, display=settings.display
+    )
+    return Opened(simulator, own, settings.title, "simulation", simulator.truth, seed)
+
+
+def _radar_overrides(settings: Configuration, given: frozenset[str]) -> dict[str, Radar | frozenset[str]]:
+    """What the configuration says of the radar, and which of its keys were really given."""
+    return {"radar": settings.radar.message, "given": frozenset(k for k in given if k.startswith("radar."))}
