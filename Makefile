@@ -1,0 +1,51 @@
+# `make run` and `make test` are each enough by themselves: they set up what is missing.
+PYTHON := .venv/bin/python
+READY  := .venv/.ready
+JOBS   ?= 2
+ARGS   ?=
+
+.DEFAULT_GOAL := help
+.PHONY: help setup run test lint format bench lock clean
+
+help: ## Show this list
+	@awk -F ':.*## ' '/^[a-z]+:.*## / { printf "  make %-8s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
+
+setup: $(READY) ## Make .venv with everything from the lock; see to Qt's system libraries
+
+$(READY): requirements-dev.lock pyproject.toml tools/setup.sh
+	@sh tools/setup.sh
+	@touch $@
+
+run: $(READY) ## Open the console; ARGS="--help", ARGS="recording.pcap"
+	@$(PYTHON) -m radar_console $(ARGS)
+
+test: lint ## Lint, then every test; ARGS="tests/core -k wrap" for a part
+	@QT_QPA_PLATFORM=offscreen $(PYTHON) -m pytest -n $(JOBS) --dist loadfile $(ARGS)
+
+lint: $(READY) ## Style, strict types and import contracts
+	@$(PYTHON) -m ruff check .
+	@$(PYTHON) -m ruff format --check .
+	@$(PYTHON) -m mypy
+	@.venv/bin/lint-imports
+
+format: $(READY) ## Rewrite the code in the house's format
+	@$(PYTHON) -m ruff check --fix .
+	@$(PYTHON) -m ruff format .
+
+bench: $(READY) ## Run every benchmark in benchmarks/
+	@set -e; for file in benchmarks/[a-z]*.py; do \
+	    echo "== $$file"; QT_QPA_PLATFORM=offscreen $(PYTHON) "$$file"; \
+	done
+
+# One version of each package for all systems and Pythons, with the hashes of its files. Pins stay
+# as they are unless they must move: UPGRADE=--upgrade moves all, UPGRADE="-P numpy" one.
+LOCK = $(PYTHON) -m uv --no-config pip compile pyproject.toml --quiet --universal --python-version 3.11 \
+       --fork-strategy fewest --generate-hashes --no-annotate --no-header $(UPGRADE)
+
+lock: $(READY) ## Bring the lock files up to pyproject.toml
+	@$(LOCK) -o requirements.lock
+	@$(LOCK) --group dev -o requirements-dev.lock
+
+clean: ## Remove .venv and all caches
+	rm -rf .venv .mypy_cache .ruff_cache .pytest_cache .hypothesis .import_linter_cache build dist
+	find . -name __pycache__ -type d -prune -exec rm -rf {} +
