@@ -1,0 +1,112 @@
+"""The console on a source: live in a window, or off-screen into a picture."""
+
+import logging
+import os
+import sys
+import threading
+from collections.abc import Iterator
+from contextlib import closing
+from pathlib import Path
+
+from radar_console.app.chain import Chain
+from radar_console.app.headless import brief, check_writable
+from radar_console.app.opening import Opened
+from radar_console.app.status import StatusLine
+from radar_console.core.errors import RadarConsoleError
+from radar_console.core.messages import Sector
+from radar_console.core.units import KM, NM
+from radar_console.display.console import Options
+from radar_console.display.feed import Feed
+from radar_console.pipeline import Pace, Policy
+
+log = logging.getLogger(__name__)
+
+
+def display_missing() -> bool:
+    """Whether Qt would find no screen to open a window on."""
+    needs_server = sys.platform.startswith(("linux", "freebsd"))
+    chosen = ("DISPLAY", "WAYLAND_DISPLAY", "QT_QPA_PLATFORM")
+    return needs_server and not any(os.environ.get(name) for name in chosen)
+
+
+def options_of(opened: Opened, user_map: Path | None) -> Options:
+    """How the console starts on this source."""
+    display, radar = opened.settings.display, opened.source.radar
+    unit = NM if display.range_unit == "NM" else KM
+    tracker = opened.settings.tracker
+    subtitle = f"{opened.kind} · seed {opened.seed}" if opened.kind == "simulation" else opened.kind
+    return Options(
+        title=opened.title,
+        subtitle=f"{subtitle} · {radar.name} · north up",
+        tracker_name=f"{tracker.filter} {tracker.particles} · {tracker.associator.upper()}",
+        range_m=display.range_km * KM if display.range_km else radar.max_range,
+        afterglow_s=display.afterglow_s,
+        trail_s=display.trail_s,
+        vector_s=display.vector_s,
+        speed_unit=display.speed_unit,
+        range_unit=display.range_unit,
+        epoch=getattr(opened.source, "epoch", None),
+        user_map=user_map,
+    )
+
+
+def run(opened: Opened, speed: float, user_map: Path | None) -> int:
+    """Open the window and stay until it is closed; the exit code."""
+    from radar_console.display import console
+
+    chain, feed, pace = Chain(opened), Feed(), Pace(speed)
+    closed = threading.Event()
+
+    def pump() -> None:
+        try:
+            with closing(chain.run(threads=True, pace=pace, policy=Policy.DROP)) as sectors:
+                for sector in sectors:
+                    feed.put(sector)
+                    if opened.truth is not None:
+                        feed.put_truth(opened.truth(sector.stop))
+                    if closed.is_set():
+                        return
+            feed.finish()
+        except RadarConsoleError as error:
+            feed.fail(str(error))
+        except Exception as error:
+            log.exception("the chain stopped")
+            feed.fail(f"stopped by a defect: {error!r}")
+
+    thread = threading.Thread(target=pump, name="pump", daemon=True)
+    thread.start()
+    code = console.run(opened.source.radar, feed, pace, chain.gauge, options_of(opened, user_map))
+    closed.set()
+    thread.join(2.0)
+    return code
+
+
+def screenshot(
+    opened: Opened, file: Path, after: float | None, size: tuple[int, int], user_map: Path | None
+) -> None:
+    """Run `after` seconds of data, or all, as fast as they come, and write a picture of the console."""
+    os.environ.setdefault("QT_QPA_PLATFORM", "offscreen")
+    from radar_console.display import console
+
+    check_writable(file)
+    chain = Chain(opened)
+    with StatusLine(opened.title, _shown(opened, after)) as status:
+
+        def sectors() -> Iterator[Sector]:
+            for sector in chain.run():
+                yield sector
+                status(sector.stop, brief(chain.tally))
+
+        console.screenshot(
+            opened.source.radar,
+            sectors(),
+            opened.truth,
+            options_of(opened, user_map),
+            file,
+            after,
+            size,
+        )
+
+
+def _shown(opened: Opened, after: float | None) -> float:
+    return opened.source.duration if after is None else min(after, opened.source.duration)
