@@ -1,0 +1,143 @@
+"""The simulator: a scenario in, sectors out, with the truth beside them."""
+
+from collections.abc import Iterator
+from copy import deepcopy
+from pathlib import Path
+
+import numpy as np
+
+from radar_console.core.errors import ScenarioError
+from radar_console.core.messages import NO_CENTROIDS, NO_PLOTS, Sector, Table
+from radar_console.core.units import KM
+from radar_console.scenario import Scenario
+from radar_console.simulator import targets
+from radar_console.simulator.antenna import Antenna
+from radar_console.simulator.clutter import land_cells, land_points
+from radar_console.simulator.points import Measurements
+from radar_console.simulator.raw import RawReturns, cell_count
+from radar_console.simulator.scene import Scene
+
+SPEED_OF_LIGHT = 299792458.0  # m/s
+
+
+class Simulator:
+    """A source of sectors from a scenario; as fast as they are consumed.
+
+    Parameters
+    ----------
+    scenario : the settings
+    rng : seeds everything that is random here; the same state gives the same sectors
+    file : named in errors
+
+    Attributes
+    ----------
+    radar : the sensor
+    duration : s, to the end of the last whole sector
+    skipped : always empty: a simulation has no bad records
+    names : of the targets in the order of their numbers in the truth
+
+    Raises
+    ------
+    ScenarioError   the scenario can't be played; everything that is wrong with it at once
+    """
+
+    def __init__(self, scenario: Scenario, rng: np.random.Generator, file: Path | str = "") -> None:
+        settings = scenario.radar
+        antenna = Antenna(
+            settings.rotation_s, max(round(settings.prf_hz * settings.rotation_s), 1), settings.sectors
+        )
+        swarm_rng, land_rng, *self._generators = rng.spawn(5)
+        built, problems = targets.build(
+            scenario.target, scenario.swarm, settings, scenario.duration_s, swarm_rng
+        )
+        self._sectors = int(scenario.duration_s / settings.rotation_s * settings.sectors * (1.0 + 1e-12))
+        self._scene = Scene(settings, antenna, built)
+        problems += targets.leaving(
+            built,
+            self._scene.slant,
+            len(scenario.target),
+            self._scene.max_range,
+            scenario.duration_s,
+        )
+        problems += _radar_problems(scenario, antenna, self._sectors)
+        if problems:
+            raise ScenarioError(file, problems)
+
+        self._clutter, self._antenna = scenario.clutter, antenna
+        cells = cell_count(settings.max_range_km, settings.cell_m)
+        self._raw = settings.returns == "raw"
+        if self._raw:
+            self._land = land_cells(scenario.clutter.land, settings, antenna, cells, land_rng)
+        else:
+            self._land_points = land_points(scenario.clutter.land, settings, antenna, land_rng)
+        self.radar = settings.message
+        self.duration = float(antenna.time(antenna.edge(self._sectors)))
+        self.skipped: dict[str, int] = {}
+        given = [target.name for target in scenario.target]
+        self.names = tuple(name or str(i + 1) for i, name in enumerate(given)) + tuple(
+            str(i + 1) for i in range(len(given), len(built))
+        )
+
+    def sectors(self) -> Iterator[Sector]:
+        """Every sector from the beginning; each call begins anew, with the same result.
+
+        Raw returns go out with `complete` at the sector's beginning, which clustering replaces;
+        centroids are complete to its end.
+        """
+        turns = self._turns()
+        table, key = (NO_PLOTS, "plots") if self._raw else (NO_CENTROIDS, "centroids")
+        for number in range(self._sectors):
+            if number % self._antenna.sectors == 0:
+                table = next(turns)
+            yield self._sector(number, key, table)
+
+    def truth(self, t: float) -> Table:
+        """The targets alive at `t`, s: TRUTH, from the radar's site."""
+        return self._scene.targets.truth(t, self._scene.radar.height_m)
+
+    def _turns(self) -> Iterator[Table]:
+        receiver, echoes, chance = deepcopy(self._generators)
+        if self._raw:
+            return RawReturns(self._scene, self._clutter, self._land, receiver, echoes, chance).turns()
+        return Measurements(self._scene, self._clutter, self._land_points, receiver, chance).turns()
+
+    def _sector(self, number: int, key: str, turn: Table) -> Sector:
+        antenna = self._antenna
+        first, last = antenna.edge(number), antenna.edge(number + 1)
+        start, stop = float(antenna.time(first)), float(antenna.time(last))
+        begin, end = float(antenna.angle(first)), float(antenna.angle(last))
+        cut = (
+            np.searchsorted(turn["pulse"], [first, last])
+            if self._raw
+            else np.searchsorted(turn["time"], [start, stop])
+        )
+        east, north = self._scene.own_position(stop)
+        sector = Sector(
+            self.radar,
+            start,
+            stop,
+            begin,
+            end,
+            complete=begin if self._raw else end,
+            position=(float(east), float(north), 0.0),
+        )
+        return sector.adding(**{key: turn[cut[0] : cut[1]]})
+
+
+def _radar_problems(scenario: Scenario, antenna: Antenna, sectors: int) -> list[tuple[str, str]]:
+    """What a radar can't do, beyond what single keys can say."""
+    radar = scenario.radar
+    problems = []
+    if antenna.pulses < radar.sectors:
+        problems.append(("radar.sectors", f"a turn has only {antenna.pulses} pulses (prf_hz · rotation_s)"))
+    unambiguous = SPEED_OF_LIGHT / (2.0 * radar.max_range_km * KM)
+    if radar.returns == "raw" and radar.prf_hz > unambiguous:
+        what = f"echoes from {radar.max_range_km:g} km would be ambiguous; at most {unambiguous:.0f}"
+        problems.append(("radar.prf_hz", what))
+    if radar.returns == "raw" and cell_count(radar.max_range_km, radar.cell_m) < 1:
+        problems.append(("radar.cell_m", "longer than the instrumented range"))
+    if sectors < 1:
+        problems.append(("duration_s", f"shorter than a sector of {radar.rotation_s / radar.sectors:g} s"))
+    if radar.speed_kt > 0.0 and scenario.clutter.land:
+        problems.append(("clutter.land", "needs a radar that stands still; remove radar.speed_kt"))
+    return problems
