@@ -18,8 +18,11 @@ libfreetype.so.6 libfreetype6
 libglib-2.0.so.0 libglib2.0-0
 libgthread-2.0.so.0 libglib2.0-0'
 
-# ... and for a window on an X display besides.
-WINDOW='libX11-xcb.so.1 libx11-xcb1
+# ... and for a window on a Wayland or X display besides.
+WINDOW='libwayland-client.so.0 libwayland-client0
+libwayland-cursor.so.0 libwayland-cursor0
+libwayland-egl.so.1 libwayland-egl1
+libX11-xcb.so.1 libx11-xcb1
 libxkbcommon-x11.so.0 libxkbcommon-x11-0
 libxcb.so.1 libxcb1
 libxcb-cursor.so.0 libxcb-cursor0
