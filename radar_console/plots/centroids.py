@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from radar_console.core.messages import CENTROID, CentroidFlag, Table, blank
 from radar_console.core.units import DEG, TURN
-from radar_console.plots.clustering import Clusters
+from radar_console.plots.clusters import Clusters
 from radar_console.scenario import PlotSettings, RadarSettings
 
 VALLEY = 0.5

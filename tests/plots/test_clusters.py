@@ -8,7 +8,7 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from radar_console.core.messages import NO_PLOTS, PLOT, Table, blank
-from radar_console.plots.clustering import StreamingClusters
+from radar_console.plots.clusters import StreamingClusters
 
 Cut = tuple[tuple[int, ...], ...]
 
