@@ -44,8 +44,8 @@ class Measurements:
         waiting = self._turn(0)
         for turn in count():
             both = np.concatenate([waiting, self._turn(turn + 1)])
-            end = (turn + 1) * self.scene.antenna.rotation
-            due = both["time"] < end
+            antenna = self.scene.antenna
+            due = both["time"] < antenna.time((turn + 1) * antenna.pulses)
             centroids, waiting = both[due], both[~due]
             # In turn 0 an error may point before the beam's first direction: never looked at.
             centroids = centroids[centroids["time"] >= 0.0]

@@ -85,11 +85,8 @@ class Simulator:
         centroids are complete to its end.
         """
         turns = self._turns()
-        table, key = (NO_PLOTS, "plots") if self._raw else (NO_CENTROIDS, "centroids")
-        for number in range(self._sectors):
-            if number % self._antenna.sectors == 0:
-                table = next(turns)
-            yield self._sector(number, key, table)
+        for turn in range(-(-self._sectors // self._antenna.sectors)):
+            yield from self._cut(next(turns), turn)
 
     def truth(self, t: float) -> Table:
         """The targets alive at `t`, s: TRUTH, from the radar's site."""
@@ -101,27 +98,28 @@ class Simulator:
             return RawReturns(self._scene, self._clutter, self._land, receiver, echoes, chance).turns()
         return Measurements(self._scene, self._clutter, self._land_points, receiver, chance).turns()
 
-    def _sector(self, number: int, key: str, turn: Table) -> Sector:
-        antenna = self._antenna
-        first, last = antenna.edge(number), antenna.edge(number + 1)
-        start, stop = float(antenna.time(first)), float(antenna.time(last))
-        begin, end = float(antenna.angle(first)), float(antenna.angle(last))
-        cut = (
-            np.searchsorted(turn["pulse"], [first, last])
-            if self._raw
-            else np.searchsorted(turn["time"], [start, stop])
-        )
-        east, north = self._scene.own_position(stop)
-        sector = Sector(
-            self.radar,
-            start,
-            stop,
-            begin,
-            end,
-            complete=begin if self._raw else end,
-            position=(float(east), float(north), 0.0),
-        )
-        return sector.adding(**{key: turn[cut[0] : cut[1]]})
+    def _cut(self, returns: Table, turn: int) -> Iterator[Sector]:
+        """The sectors of a turn, as many of them as belong to the simulation."""
+        antenna, raw = self._antenna, self._raw
+        first = turn * antenna.sectors
+        last = min(first + antenna.sectors, self._sectors)
+        edges = np.array([antenna.edge(number) for number in range(first, last + 1)])
+        times, angles = antenna.time(edges).tolist(), antenna.angle(edges).tolist()
+        east, north = (own.tolist() for own in self._scene.own_position(antenna.time(edges)))
+        cuts = np.searchsorted(returns["time"], times).tolist()
+        for i in range(last - first):
+            part = returns[cuts[i] : cuts[i + 1]]
+            yield Sector(
+                self.radar,
+                start=times[i],
+                stop=times[i + 1],
+                begin=angles[i],
+                end=angles[i + 1],
+                complete=angles[i] if raw else angles[i + 1],
+                position=(east[i + 1], north[i + 1], 0.0),
+                plots=part if raw else NO_PLOTS,
+                centroids=NO_CENTROIDS if raw else part,
+            )
 
 
 def _radar_problems(scenario: Scenario, antenna: Antenna, sectors: int) -> list[tuple[str, str]]:

@@ -66,9 +66,8 @@ class RawReturns:
         voltage = np.concatenate([volts for _, volts in echoes])
         seen, amplitude = detection.receive(stream, voltage, self._receiver)
         alarms, level = detection.false_alarms(p_fa, antenna.pulses * self.cells, self._receiver)
-        single, single_level = self._single_returns(turn)
-        alarms, level = _strongest(np.append(start + alarms, single), np.append(level, single_level))
-        stream, amplitude = detection.merge(seen, amplitude, alarms, level)
+        stream, amplitude = detection.merge(seen, amplitude, start + alarms, level)
+        stream, amplitude = self._with_single_returns(turn, stream, amplitude)
         above = amplitude >= detection.threshold(p_fa)
         return self._plots(stream[above], amplitude[above])
 
@@ -88,15 +87,13 @@ class RawReturns:
         if self.scene.radar.fluctuation == "swerling0" or len(target) == 0:
             return np.ones(len(target))
         first = np.diff(target, prepend=-1) > 0
+        last = np.append(first[1:], True)
         previous = np.where(first, self._last_lit[target], np.roll(pulse, 1))
         begins = pulse - previous > self._lit / self.scene.antenna.step
-        drawn = self._echoes.standard_exponential(np.count_nonzero(begins))
-        # Before its first new passage in this turn a target has the strength it came with.
-        strengths = np.concatenate([self._strength[target[first]], drawn])
-        come_with, newest = np.cumsum(first) - 1, np.count_nonzero(first) + np.cumsum(begins) - 1
-        begun = np.cumsum(begins) - (np.cumsum(begins) - begins)[first][come_with] > 0
-        strength = strengths[np.where(begun, newest, come_with)]
-        last = np.append(first[1:], True)
+        part = first | begins  # a passage, or the rest of one that came over north
+        strengths = self._strength[target[part]]
+        strengths[begins[part]] = self._echoes.standard_exponential(np.count_nonzero(begins))
+        strength: Array = strengths[np.cumsum(part) - 1]
         self._strength[target[last]], self._last_lit[target[last]] = strength[last], pulse[last]
         return strength
 
@@ -128,13 +125,20 @@ class RawReturns:
         voltage = np.sqrt(power) * np.exp(1j * phase)
         return detection.spread(pulse, distance, voltage, radar.cell_m, self.cells)
 
-    def _single_returns(self, turn: int) -> tuple[Cells, Array]:
-        """Clutter of single returns, as strong as false alarms."""
+    def _with_single_returns(self, turn: int, stream: Cells, amplitude: Array) -> tuple[Cells, Array]:
+        """Add clutter of single returns, as strong as false alarms; a cell keeps the strongest."""
         radar = self.scene.radar
         places = points(self.clutter, self.scene, turn, self._chance)
+        if len(places.pulse) == 0:
+            return stream, amplitude
         cell = np.minimum((places.distance / radar.cell_m).astype(np.int64), self.cells - 1)
-        stream = np.floor(places.pulse).astype(np.int64) * self.cells + cell
-        return stream, detection.exceeding(radar.p_fa, len(stream), self._chance)
+        single = np.floor(places.pulse).astype(np.int64) * self.cells + cell
+        stream = np.append(stream, single)
+        level = np.append(amplitude, detection.exceeding(radar.p_fa, len(single), self._chance))
+        order = np.lexsort((-level, stream))
+        stream, level = stream[order], level[order]
+        first = np.diff(stream, prepend=-1) > 0
+        return stream[first], level[first]
 
     def _plots(self, stream: Cells, amplitude: Array) -> Table:
         antenna = self.scene.antenna
@@ -150,11 +154,3 @@ class RawReturns:
 def cell_count(max_range_km: float, cell_m: float) -> int:
     """Whole range cells in the instrumented range; the tolerance is for ratios like 6 km / 0.1 m."""
     return int(max_range_km * KM / cell_m * (1.0 + 1e-12))
-
-
-def _strongest(cells: Cells, amplitude: Array) -> tuple[Cells, Array]:
-    """Every cell once, with its greatest amplitude."""
-    order = np.lexsort((-amplitude, cells))
-    cells, amplitude = cells[order], amplitude[order]
-    first = np.diff(cells, prepend=-1) > 0
-    return cells[first], amplitude[first]

@@ -75,7 +75,7 @@ class Scene:
         target = np.repeat(every, count)
         within = np.arange(len(target)) - np.repeat(np.cumsum(count) - count, count)
         pulse = turn * antenna.pulses + (np.repeat(first, count) + within) % antenna.pulses
-        order = np.lexsort((pulse, target))
+        order = np.argsort(target * antenna.pulses + pulse % antenna.pulses)
         target, pulse = target[order], pulse[order]
         alive = self.targets.alive(target, antenna.time(pulse))
         return target[alive], pulse[alive]
