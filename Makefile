@@ -5,7 +5,7 @@ JOBS   ?= 2
 ARGS   ?=
 
 .DEFAULT_GOAL := help
-.PHONY: help setup run test lint format bench lock clean
+.PHONY: help setup run test lint format bench pictures lock clean
 
 help: ## Show this list
 	@awk -F ':.*## ' '/^[a-z]+:.*## / { printf "  make %-8s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -32,10 +32,17 @@ format: $(READY) ## Rewrite the code in the house's format
 	@$(PYTHON) -m ruff check --fix .
 	@$(PYTHON) -m ruff format .
 
-bench: $(READY) ## Run every benchmark in benchmarks/
-	@set -e; for file in benchmarks/[a-z]*.py; do \
-	    echo "== $$file"; QT_QPA_PLATFORM=offscreen $(PYTHON) "$$file"; \
-	done
+BENCHMARKS = $(filter-out benchmarks/__init__.py benchmarks/acceptance.py,$(wildcard benchmarks/*.py))
+
+bench: $(READY) ## Measure everything that benchmarks/ measures on simulated radar
+	@set -e; export QT_QPA_PLATFORM=offscreen; \
+	for file in $(BENCHMARKS); do echo "== $$file"; $(PYTHON) "$$file"; done; \
+	echo "== benchmarks/acceptance.py scenario twenty-five"; \
+	$(PYTHON) benchmarks/acceptance.py scenario twenty-five
+
+pictures: $(READY) ## Make the pictures that README and docs show
+	@mkdir -p docs/pictures
+	@$(PYTHON) -m radar_console twenty-five --screenshot docs/pictures/twenty-five.png --after 120
 
 # One version of each package for all systems and Pythons, with the hashes of its files. Pins stay
 # as they are unless they must move: UPGRADE=--upgrade moves all, UPGRADE="-P numpy" one.

@@ -69,7 +69,7 @@ find_python() {
     done
 }
 
-version_of() { "$1" -c 'import sys; print("%d.%d" % sys.version_info[:2])' 2>/dev/null || echo none; }
+version_of() { "$1" -c 'import sys; print("%d.%d" % sys.version_info[:2])' 2>/dev/null || echo "not there"; }
 
 choose_python() {
     python=$(find_python makes_venvs)
