@@ -1,0 +1,88 @@
+"""Cut a table of reports or raw returns into the sectors that a turning beam would have sent."""
+
+from collections.abc import Iterator
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from radar_console.core.geometry import Array
+from radar_console.core.messages import PLOT, Radar, Sector, Table
+from radar_console.core.rotation import Encoder
+from radar_console.core.units import TURN
+
+SECTORS = 64  # messages a turn
+LONGEST_SILENCE = 10  # turns without marks or reports; beyond it the beam is not taken to have turned
+
+_KEYS = {
+    "name": "name",
+    "rotation_s": "rotation",
+    "max_range_km": "max_range",
+    "sd_range_m": "sd_range",
+    "sd_azimuth_deg": "sd_azimuth",
+    "beam_width_deg": "beam_width",
+    "latitude_deg": "site",
+    "longitude_deg": "site",
+    "height_m": "site",
+}
+
+
+def stated(radar: Radar | None, given: frozenset[str]) -> dict[str, Any]:
+    """The fields of `radar` that a configuration states itself, by name.
+
+    Parameters
+    ----------
+    radar : the radar of the configuration; None is none
+    given : the keys that the file really has, such as ``radar.rotation_s``
+    """
+    if radar is None:
+        return {}
+    names = {_KEYS[key] for key in (k.removeprefix("radar.") for k in given) if key in _KEYS}
+    fields = {name: getattr(radar, name) for name in names}
+    return {name: value for name, value in fields.items() if value is not None}
+
+
+def first_turn(encoder: Encoder, angle: Array) -> int:
+    """How many turns to add so that the smallest of the angles lies in [0, 2π)."""
+    return -int(np.floor(angle.min() / TURN))
+
+
+def cut(radar: Radar, encoder: Encoder, table: Table, angle: Array, active: Array) -> Iterator[Sector]:
+    """Yield a sector for every 64th of a turn, with its rows of the table, in the order of angle.
+
+    Where nothing happens for more than ten turns the recording has a hole: no sector is sent,
+    because the beam was not watched.
+
+    Parameters
+    ----------
+    radar : goes into every sector
+    encoder : the beam
+    table : CENTROID, or PLOT
+    angle : (rows,) unwrapped angle of each row, rad
+    active : (n,) angles, rad, at which the beam was seen, n ≥ 1; they bound the sectors
+    """
+    raw = table.dtype == PLOT
+    order = np.lexsort((table["cell"], table["pulse"]) if raw else (table["range"], angle))
+    table, angle = table[order], angle[order]
+    numbers = _sector_numbers(np.concatenate((active, angle)))
+    step = TURN / SECTORS
+    # Of raw returns the pulses stay in their order, whatever the last bit of their angles says.
+    edge_of = np.floor(np.maximum.accumulate(angle) / step)
+    first = np.searchsorted(edge_of, numbers, side="left")
+    last = np.searchsorted(edge_of, numbers, side="right")
+    begin, end = numbers * step, (numbers + 1) * step
+    start, stop = encoder.time_at(begin), encoder.time_at(end)
+    name = "plots" if raw else "centroids"
+    for i, sector in enumerate(zip(start, stop, begin, end, end, strict=True)):
+        rows = table[first[i] : last[i]]
+        message = Sector(radar, *map(float, sector))
+        yield replace(message, **{name: rows}) if len(rows) else message
+
+
+def _sector_numbers(active: Array) -> Array:
+    """The numbers of the sectors between the first and the last activity, without the holes."""
+    seen = np.unique(np.floor(active / (TURN / SECTORS)))
+    numbers = np.arange(seen[0], seen[-1] + 1.0)
+    following = seen[np.minimum(np.searchsorted(seen, numbers), len(seen) - 1)]
+    preceding = seen[np.searchsorted(seen, numbers, side="right") - 1]
+    return numbers[following - preceding <= LONGEST_SILENCE * SECTORS]
