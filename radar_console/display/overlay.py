@@ -1,0 +1,340 @@
+"""What moves with the tracks: speed vectors, symbols, labels, truth, lost tracks; one batch of each."""
+
+from dataclasses import dataclass
+
+import numpy as np
+import pyqtgraph as pg
+from numpy.typing import NDArray
+from PySide6.QtCore import QLineF, QPointF, Qt
+from PySide6.QtGui import QColor, QFontMetricsF, QPainter, QPen, QPixmap, QStaticText
+
+from radar_console.core.geometry import to_polar
+from radar_console.core.messages import Table, TrackStatus
+from radar_console.core.units import FLIGHT_LEVEL
+from radar_console.display import fonts, labels
+from radar_console.display.furniture import qcolor
+from radar_console.display.palette import Palette, mix
+from radar_console.display.picture import Picture, name
+from radar_console.display.projection import Projection
+from radar_console.display.quantities import bearing, significant
+from radar_console.display.view import Layer, View
+
+Floats = NDArray[np.float64]
+Integers = NDArray[np.int64]
+Boxes = list[tuple[float, float, float, float]]
+
+SYMBOL = 6.5
+"""Radius of a track's symbol, px."""
+
+_TILE = 20  # px, of a symbol's pixmap
+_BRACKET = 12.0  # px, from the symbol's middle to the bracket
+_MARGIN = 60.0  # px beyond the edge where a track may still reach into the screen
+_PAD = 2.0  # px about a label's text
+
+
+@dataclass(frozen=True, slots=True)
+class Shown:
+    """The tracks on the screen, in the order in which labels are placed.
+
+    Attributes
+    ----------
+    rows : (n,) TRACK
+    numbers : (n,) short numbers
+    x, y : (n,) px
+    tip_x, tip_y : (n,) ends of the speed vectors, px
+    """
+
+    rows: Table
+    numbers: Integers
+    x: Floats
+    y: Floats
+    tip_x: Floats
+    tip_y: Floats
+
+    @classmethod
+    def of(cls, picture: Picture, view: View, on: Projection) -> "Shown":
+        rows, numbers = picture.tracks, picture.numbers
+        x, y = on.to_screen(rows["east"] - picture.position[0], rows["north"] - picture.position[1])
+        inside = (np.abs(x - 0.5 * on.width) < 0.5 * on.width + _MARGIN) & (
+            np.abs(y - 0.5 * on.height) < 0.5 * on.height + _MARGIN
+        )
+        selected = rows["track"] == (-1 if view.selected is None else view.selected)
+        # The selected one chooses first, then the oldest: who comes new finds its place around them.
+        order = np.lexsort((rows["track"], rows["status"] == TrackStatus.TENTATIVE, ~selected))
+        order = order[inside[order]]
+        rows, numbers, x, y = rows[order], numbers[order], x[order], y[order]
+        ahead = view.vector_s * on.scale
+        return cls(rows, numbers, x, y, x + rows["v_east"] * ahead, y - rows["v_north"] * ahead)
+
+
+class Overlay:
+    """Paints the tracks; remembers where labels were and the texts that it has laid out.
+
+    Attributes
+    ----------
+    hidden : labels that found no place, the last time
+    """
+
+    def __init__(self) -> None:
+        self.hidden = 0
+        self._lines = pg.Qt.internals.PrimitiveArray(QLineF, 4)
+        self._texts: dict[tuple[str, bool], QStaticText] = {}
+        self._placed: dict[int, int] = {}
+        self._symbols = QPixmap()
+        self._symbols_for: tuple[Palette, float] | None = None
+
+    def paint(
+        self,
+        painter: QPainter,
+        on: Projection,
+        view: View,
+        picture: Picture,
+        palette: Palette,
+        occupied: Boxes,
+        detail: int,
+    ) -> None:
+        """Paint everything on a device whose pixels are those of `on`.
+
+        `occupied` are boxes that labels should stay clear of; `detail` is that of the labels, which
+        may be less than the operator's when the machine is short of time.
+        """
+        self.hidden = 0
+        if view.shows(Layer.TRUTH):
+            self._paint_truth(painter, on, picture, palette)
+        if not view.shows(Layer.TRACKS):
+            return
+        shown = Shown.of(picture, view, on)
+        self._paint_lost(painter, on, picture, palette)
+        if view.shows(Layer.VECTORS):
+            self._paint_vectors(painter, shown, palette)
+        self._paint_symbols(painter, shown, palette)
+        self._paint_bracket(painter, shown, view, palette)
+        if view.shows(Layer.LABELS):
+            self._paint_labels(painter, on, view, shown, palette, occupied, detail)
+
+    def _paint_truth(self, painter: QPainter, on: Projection, picture: Picture, palette: Palette) -> None:
+        truth = picture.truth
+        x, y = on.to_screen(truth["east"] - picture.position[0], truth["north"] - picture.position[1])
+        painter.setPen(QPen(qcolor(palette.truth), 2.6, c=Qt.PenCapStyle.RoundCap))
+        self._draw_lines(painter, x, y, x + 0.01, y)
+
+    def _paint_lost(self, painter: QPainter, on: Projection, picture: Picture, palette: Palette) -> None:
+        """A cross where a track was last, with its name."""
+        lost = picture.lost
+        x, y = on.to_screen(lost["east"] - picture.position[0], lost["north"] - picture.position[1])
+        painter.setPen(QPen(qcolor(palette.alarm), 1.6))
+        for side in (1.0, -1.0):
+            self._draw_lines(painter, x - 5.0, y - 5.0 * side, x + 5.0, y + 5.0 * side)
+        painter.setFont(fonts.font(fonts.SMALL))
+        for k in range(len(lost)):
+            text = self._text(f"{name(int(picture.lost_numbers[k]))} lost", False)
+            painter.drawStaticText(QPointF(round(x[k] + 9.0), round(y[k] - 7.0)), text)
+
+    def _paint_vectors(self, painter: QPainter, shown: Shown, palette: Palette) -> None:
+        """From the rim of the symbol to where the track will be; dashed where it coasts."""
+        dx, dy = shown.tip_x - shown.x, shown.tip_y - shown.y
+        length = np.hypot(dx, dy)
+        status = shown.rows["status"]
+        painter.setPen(Qt.PenStyle.NoPen)
+        for state, hue, style in (
+            (TrackStatus.TENTATIVE, palette.tentative, Qt.PenStyle.SolidLine),
+            (TrackStatus.CONFIRMED, palette.track, Qt.PenStyle.SolidLine),
+            (TrackStatus.COASTING, palette.coasting, Qt.PenStyle.DashLine),
+        ):
+            kept = (status == state) & (length > SYMBOL)
+            part = SYMBOL / length[kept]
+            painter.setPen(QPen(qcolor(hue, 0.9), 1.3, style))
+            self._draw_lines(
+                painter,
+                shown.x[kept] + dx[kept] * part,
+                shown.y[kept] + dy[kept] * part,
+                shown.tip_x[kept],
+                shown.tip_y[kept],
+            )
+
+    def _paint_symbols(self, painter: QPainter, shown: Shown, palette: Palette) -> None:
+        """One pixmap holds the symbol of each status side by side."""
+        ratio = painter.device().devicePixelRatioF()
+        if self._symbols_for != (palette, ratio):
+            self._symbols, self._symbols_for = _symbol_tiles(palette, ratio), (palette, ratio)
+        count = len(shown.x)
+        if count == 0:
+            return
+        fragments = pg.Qt.internals.PrimitiveArray(QPainter.PixmapFragment, 10)
+        fragments.resize(count)
+        table = fragments.ndarray()
+        table[:, 0] = np.floor(shown.x * ratio) / ratio
+        table[:, 1] = np.floor(shown.y * ratio) / ratio
+        table[:, 2] = shown.rows["status"].astype(float) * _TILE * ratio
+        table[:, 3] = 0.0
+        table[:, 4:6] = _TILE * ratio
+        table[:, 6:8] = 1.0 / ratio
+        table[:, 8:] = (0.0, 1.0)
+        painter.drawPixmapFragments(*fragments.drawargs(), self._symbols)
+
+    def _paint_bracket(self, painter: QPainter, shown: Shown, view: View, palette: Palette) -> None:
+        """Four corners about the selected track."""
+        chosen = np.flatnonzero(shown.rows["track"] == view.selected) if view.selected is not None else ()
+        for k in chosen:
+            x, y = np.floor(shown.x[k]) + 0.5, np.floor(shown.y[k]) + 0.5
+            corners = np.array([(1.0, 1.0), (1.0, -1.0), (-1.0, 1.0), (-1.0, -1.0)]) * _BRACKET
+            painter.setPen(QPen(qcolor(palette.selection), 1.6))
+            for inward in ((0.55, 1.0), (1.0, 0.55)):
+                ends = corners * inward
+                self._draw_lines(
+                    painter, x + corners[:, 0], y + corners[:, 1], x + ends[:, 0], y + ends[:, 1]
+                )
+
+    def _paint_labels(
+        self,
+        painter: QPainter,
+        on: Projection,
+        view: View,
+        shown: Shown,
+        palette: Palette,
+        occupied: Boxes,
+        detail: int,
+    ) -> None:
+        board = labels.board(on.width, on.height)
+        labels.mark_symbols(board, shown.x, shown.y)
+        if view.shows(Layer.VECTORS):
+            labels.mark_lines(board, shown.x, shown.y, shown.tip_x, shown.tip_y)
+        for box in occupied:
+            labels.mark_box(board, *box)
+        titled = shown.numbers > 0
+        if view.selected is not None:
+            titled = titled | (shown.rows["track"] == view.selected)
+        kept = np.flatnonzero(titled)
+        rows, x, y = shown.rows[kept], shown.x[kept], shown.y[kept]
+        texts = [
+            label_text(row, number, view, detail)
+            for row, number in zip(rows, shown.numbers[kept], strict=True)
+        ]
+        metrics = QFontMetricsF(fonts.font(fonts.SMALL, bold=True))
+        advance, line = metrics.horizontalAdvance("0"), metrics.height()
+        sizes = (
+            np.array(
+                [
+                    [[max(map(len, text)) * advance, len(text) * line], [len(text[0]) * advance, line]]
+                    for text in texts
+                ]
+            ).reshape(-1, 2, 2)
+            + 2.0 * _PAD
+        )
+        way = np.stack([rows["v_east"], -rows["v_north"]], axis=1)
+        speed = np.hypot(way[:, 0], way[:, 1])
+        way = way / np.maximum(speed, 1e-9)[:, None]
+        previous = np.array([self._placed.get(int(t), labels.HIDDEN) for t in rows["track"]], np.int64)
+        insist = (rows["track"] == (-1 if view.selected is None else view.selected)).astype(np.int64)
+        place, level, left, top = labels.place(board, x, y, way, sizes, previous, insist)
+        self._placed = dict(zip(rows["track"].tolist(), place.tolist(), strict=True))
+        visible = np.flatnonzero(place != labels.HIDDEN)
+        self.hidden = len(place) - len(visible)
+        size = sizes[np.arange(len(place)), level]
+        self._paint_leaders(
+            painter, x[visible], y[visible], left[visible], top[visible], size[visible], palette
+        )
+        self._paint_texts(painter, texts, visible, level, left + _PAD, top + _PAD, line, insist, palette)
+
+    def _paint_leaders(
+        self,
+        painter: QPainter,
+        x: Floats,
+        y: Floats,
+        left: Floats,
+        top: Floats,
+        size: Floats,
+        palette: Palette,
+    ) -> None:
+        """From the rim of the symbol to the nearest point of the label."""
+        end_x = np.clip(x, left, left + size[:, 0])
+        end_y = np.clip(y, top, top + size[:, 1])
+        dx, dy = end_x - x, end_y - y
+        length = np.maximum(np.hypot(dx, dy), 1e-9)
+        long = length > SYMBOL + 2.0
+        part = SYMBOL / length
+        painter.setPen(QPen(qcolor(mix(palette.scope, palette.track, 0.5)), 1.0))
+        self._draw_lines(painter, (x + dx * part)[long], (y + dy * part)[long], end_x[long], end_y[long])
+
+    def _paint_texts(
+        self,
+        painter: QPainter,
+        texts: list[tuple[str, ...]],
+        visible: Integers,
+        level: Integers,
+        left: Floats,
+        top: Floats,
+        line: float,
+        strong: Integers,
+        palette: Palette,
+    ) -> None:
+        """The names, then the lines below them: two passes, since a change of font costs most."""
+        painter.setFont(fonts.font(fonts.SMALL, bold=True))
+        for chosen, hue in ((0, palette.text), (1, palette.bright)):
+            painter.setPen(qcolor(hue))
+            for k in visible[strong[visible] == chosen]:
+                painter.drawStaticText(QPointF(round(left[k]), round(top[k])), self._text(texts[k][0], True))
+        painter.setFont(fonts.font(fonts.SMALL))
+        painter.setPen(qcolor(palette.dim))
+        for k in visible[level[visible] == 0]:
+            for number, text in enumerate(texts[k][1:], 1):
+                painter.drawStaticText(
+                    QPointF(round(left[k]), round(top[k] + number * line)), self._text(text, False)
+                )
+
+    def _text(self, text: str, bold: bool) -> QStaticText:
+        """The text, laid out once."""
+        known = self._texts.get((text, bold))
+        if known is None:
+            if len(self._texts) > 8000:
+                self._texts.clear()
+            known = QStaticText(text)
+            known.setTextFormat(Qt.TextFormat.PlainText)
+            known.setPerformanceHint(QStaticText.PerformanceHint.AggressiveCaching)
+            known.prepare(font=fonts.font(fonts.SMALL, bold=bold))
+            self._texts[text, bold] = known
+        return known
+
+    def _draw_lines(self, painter: QPainter, x0: Floats, y0: Floats, x1: Floats, y1: Floats) -> None:
+        """(n,) separate lines in one call."""
+        if len(x0) == 0:
+            return
+        self._lines.resize(len(x0))
+        table = self._lines.ndarray()
+        table[:, 0], table[:, 1], table[:, 2], table[:, 3] = x0, y0, x1, y1
+        painter.drawLines(*self._lines.drawargs())
+
+
+def label_text(row: np.void, number: int, view: View, detail: int) -> tuple[str, ...]:
+    """The lines of a label: name; speed; course and flight level."""
+    title = name(int(number))
+    if detail == 1:
+        return (title,)
+    speed, azimuth = to_polar(row["v_east"], row["v_north"])
+    pace = f"{significant(float(speed) / view.speed_unit.metres_per_second)} {view.speed_unit}"
+    if detail == 2:
+        return title, pace
+    course = bearing(float(azimuth))
+    level = "" if np.isnan(row["up"]) else f" FL{max(round(row['up'] / FLIGHT_LEVEL), 0):03d}"
+    return title, pace, course + level
+
+
+def _symbol_tiles(palette: Palette, ratio: float) -> QPixmap:
+    """Symbols by status, side by side: tentative small and dotted, confirmed full, coasting dashed."""
+    tiles = QPixmap(round(_TILE * 4 * ratio), round(_TILE * ratio))
+    tiles.fill(QColor(0, 0, 0, 0))
+    painter = QPainter(tiles)
+    painter.scale(ratio, ratio)
+    painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+    middle = 0.5 * _TILE
+    dashes = QPen(qcolor(palette.coasting), 1.6)
+    dashes.setDashPattern([2.2, 1.9])
+    for status, pen, radius in (
+        (TrackStatus.TENTATIVE, QPen(qcolor(palette.tentative), 1.2), 4.0),
+        (TrackStatus.CONFIRMED, QPen(qcolor(palette.track), 1.6), SYMBOL),
+        (TrackStatus.COASTING, dashes, SYMBOL),
+    ):
+        painter.setPen(pen)
+        painter.drawEllipse(QPointF(_TILE * int(status) + middle + 0.5, middle + 0.5), radius, radius)
+    painter.end()
+    return tiles
