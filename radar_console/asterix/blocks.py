@@ -6,59 +6,11 @@ from collections.abc import Iterator
 HEADER = 3
 CHAIN = 3  # so many good blocks in a row are no accident
 
-CATEGORIES = frozenset(
-    # fmt: off
-    [
-        1,
-        2,
-        3,
-        4,
-        7,
-        8,
-        9,
-        10,
-        11,
-        15,
-        16,
-        17,
-        18,
-        19,
-        20,
-        21,
-        22,
-        23,
-        24,
-        25,
-        30,
-        31,
-        32,
-        33,
-        34,
-        48,
-        62,
-        63,
-        65,
-        129,
-        150,
-        151,
-        152,
-        153,
-        154,
-        156,
-        157,
-        159,
-        204,
-        205,
-        238,
-        239,
-        240,
-        241,
-        244,
-        247,
-        252,
-    ],
-    # fmt: on
-)
+_IN_USE = """
+1 2 3 4 7 8 9 10 11 15 16 17 18 19 20 21 22 23 24 25 30 31 32 33 34 48 62 63 65
+129 150 151 152 153 154 156 157 159 204 205 238 239 240 241 244 247 252
+"""
+CATEGORIES = frozenset(map(int, _IN_USE.split()))
 """Categories in use, by EUROCONTROL's list."""
 
 

@@ -117,7 +117,7 @@ def read(file: Path) -> Contents:
                         count
                     )
                     continue
-                copy = (category, *items.items())
+                copy = (category, tuple(items.items()))
                 if ("140" in items or "030" in items) and (copy in recent or copy in older):
                     contents.copies += 1
                     continue
@@ -132,7 +132,7 @@ def read(file: Path) -> Contents:
     return contents
 
 
-Copy = tuple[int | tuple[str, bytes], ...]
+Copy = tuple[int, tuple[tuple[str, bytes], ...]]
 
 
 def _add(contents: Contents, category: int, items: Items, sequence: int, captured: float) -> None:

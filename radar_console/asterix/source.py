@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from radar_console.asterix import reports
 from radar_console.asterix.clock import steady, unwrap_days
-from radar_console.asterix.reports import TICKS, Contents, Station
+from radar_console.asterix.reports import TICKS, Contents
 from radar_console.core.errors import InputError
 from radar_console.core.geometry import Array, unwrap_near, wrap
 from radar_console.core.messages import CENTROID, Radar, Sector, Table, blank
@@ -193,15 +193,15 @@ class AsterixRecording:
         if len(marks) >= 2:
             return self._timed_by_marks(table, time, azimuth, marks, mark_time, rotation)
 
-        time, kept, jumps = steady(time, LATE, LATE * LONGEST_SILENCE)
+        steadied, kept, jumps = steady(time, LATE, LATE * LONGEST_SILENCE)
         self._note("times of day set back (later times moved on)", jumps)
-        self._note_late(time[kept])
+        self._note_late(steadied[kept])
         self._skip("reports with a stray time of day", int(np.sum(~kept)))
-        rotation, source = self._rotation(rotation, None, time[kept], azimuth[kept])
-        encoder = encoder_of_reports(time[kept], azimuth[kept], rotation)
-        fits = kept & (np.abs(wrap(azimuth - encoder.angle_at(time))) <= OFF_BEAM)
+        rotation, source = self._rotation(rotation, None, steadied[kept], azimuth[kept])
+        encoder = encoder_of_reports(steadied[kept], azimuth[kept], rotation)
+        fits = kept & (np.abs(wrap(azimuth - encoder.angle_at(steadied))) <= OFF_BEAM)
         self._skip("reports whose time of day does not fit their azimuth", int(np.sum(kept & ~fits)))
-        return time, _Beam(encoder, source, np.empty(0)), fits
+        return steadied, _Beam(encoder, source, np.empty(0)), fits
 
     def _timed_by_marks(
         self,
@@ -220,7 +220,7 @@ class AsterixRecording:
         # A report follows the clock of the mark before it in the file.
         sequence, moved = marks["sequence"][kept], (steadied - mark_time)[kept]
         before = np.maximum(np.searchsorted(sequence, table["sequence"]) - 1, 0)
-        time = time + moved[before]
+        time = np.asarray(time + moved[before])
         mark_time, mark_azimuth = steadied[kept], mark_azimuth[kept]
         rotation, source = self._rotation(rotation, rotation_of_marks(mark_time, mark_azimuth), time, azimuth)
         encoder, strays = encoder_of_marks(mark_time, mark_azimuth, rotation)

@@ -37,13 +37,15 @@ class Encoder:
         """Beam angle, rad, at times, s."""
         rate = TURN / self.rotation
         before, after = np.minimum(time - self.time[0], 0.0), np.maximum(time - self.time[-1], 0.0)
-        return np.interp(time, self.time, self.angle) + rate * (before + after)
+        angle: Array = np.interp(time, self.time, self.angle) + rate * (before + after)
+        return angle
 
     def time_at(self, angle: Array) -> Array:
         """Times, s, at beam angles, rad; the inverse of `angle_at`."""
         rate = TURN / self.rotation
         before, after = np.minimum(angle - self.angle[0], 0.0), np.maximum(angle - self.angle[-1], 0.0)
-        return np.interp(angle, self.angle, self.time) + (before + after) / rate
+        time: Array = np.interp(angle, self.angle, self.time) + (before + after) / rate
+        return time
 
     def shifted(self, turns: int) -> "Encoder":
         """The same encoder, counting its turns from another north."""
@@ -173,7 +175,8 @@ def _smooth(time: Array, phase: Array, rotation: float) -> Array:
     total = np.concatenate(([0.0], np.cumsum(np.exp(1j * phase))))
     first = np.searchsorted(time, time - NEIGHBOURS * rotation, side="left")
     last = np.searchsorted(time, time + NEIGHBOURS * rotation, side="right")
-    return np.angle(total[last] - total[first])
+    smooth: Array = np.angle(total[last] - total[first])
+    return smooth
 
 
 def _increasing(time: Array, angle: Array) -> NDArray[np.intp]:

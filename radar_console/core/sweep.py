@@ -1,13 +1,12 @@
 """Cut a table of reports or raw returns into the sectors that a turning beam would have sent."""
 
-from collections.abc import Iterator
-from dataclasses import replace
+from collections.abc import Callable, Iterator
 from typing import Any
 
 import numpy as np
 
 from radar_console.core.geometry import Array
-from radar_console.core.messages import PLOT, Radar, Sector, Table
+from radar_console.core.messages import NO_CENTROIDS, NO_PLOTS, PLOT, Radar, Sector, Table
 from radar_console.core.rotation import Encoder
 from radar_console.core.units import TURN
 
@@ -47,7 +46,14 @@ def first_turn(encoder: Encoder, angle: Array) -> int:
     return -int(np.floor(angle.min() / TURN))
 
 
-def cut(radar: Radar, encoder: Encoder, table: Table, angle: Array, active: Array) -> Iterator[Sector]:
+def cut(
+    radar: Radar,
+    encoder: Encoder,
+    table: Table,
+    angle: Array,
+    active: Array,
+    positions: Callable[[Array], Array] | None = None,
+) -> Iterator[Sector]:
     """Yield a sector for every 64th of a turn, with its rows of the table, in the order of angle.
 
     Where nothing happens for more than ten turns the recording has a hole: no sector is sent,
@@ -60,6 +66,7 @@ def cut(radar: Radar, encoder: Encoder, table: Table, angle: Array, active: Arra
     table : CENTROID, or PLOT
     angle : (rows,) unwrapped angle of each row, rad
     active : (n,) angles, rad, at which the beam was seen, n ≥ 1; they bound the sectors
+    positions : where the sensor is, (n, 3) m, at times (n,) s; None if it stands at the origin
     """
     raw = table.dtype == PLOT
     order = np.lexsort((table["cell"], table["pulse"]) if raw else (table["range"], angle))
@@ -72,11 +79,20 @@ def cut(radar: Radar, encoder: Encoder, table: Table, angle: Array, active: Arra
     last = np.searchsorted(edge_of, numbers, side="right")
     begin, end = numbers * step, (numbers + 1) * step
     start, stop = encoder.time_at(begin), encoder.time_at(end)
-    name = "plots" if raw else "centroids"
-    for i, sector in enumerate(zip(start, stop, begin, end, end, strict=True)):
+    where = positions(stop) if positions is not None else np.zeros((len(stop), 3))
+    for i in range(len(numbers)):
         rows = table[first[i] : last[i]]
-        message = Sector(radar, *map(float, sector))
-        yield replace(message, **{name: rows}) if len(rows) else message
+        yield Sector(
+            radar,
+            start=float(start[i]),
+            stop=float(stop[i]),
+            begin=float(begin[i]),
+            end=float(end[i]),
+            complete=float(end[i]),
+            position=tuple(where[i].tolist()),
+            plots=rows if raw else NO_PLOTS,
+            centroids=NO_CENTROIDS if raw else rows,
+        )
 
 
 def _sector_numbers(active: Array) -> Array:
@@ -85,4 +101,5 @@ def _sector_numbers(active: Array) -> Array:
     numbers = np.arange(seen[0], seen[-1] + 1.0)
     following = seen[np.minimum(np.searchsorted(seen, numbers), len(seen) - 1)]
     preceding = seen[np.searchsorted(seen, numbers, side="right") - 1]
-    return numbers[following - preceding <= LONGEST_SILENCE * SECTORS]
+    watched: Array = numbers[following - preceding <= LONGEST_SILENCE * SECTORS]
+    return watched
