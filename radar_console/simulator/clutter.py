@@ -132,7 +132,7 @@ def land_cells(
     The ground is complex Gaussian, independent from pulse to pulse of azimuth; the beam smooths it.
     """
     stream, voltage = [np.empty(0, np.int64)], [np.empty(0, complex)]
-    reach = int(np.ceil(0.5 * LIT * radar.beam_width_deg * DEG / antenna.step))
+    reach = int(np.ceil(LIT * radar.beam_width_deg * DEG / antenna.step))
     pattern = two_way_gain(np.arange(-reach, reach + 1) * antenna.step, radar.beam_width_deg * DEG)
     weights = np.sqrt(pattern / pattern.sum())
     for patch in patches:
@@ -167,12 +167,11 @@ def land_points(
 def _extent(
     patch: LandClutter, radar: RadarSettings, antenna: Antenna, cells: int
 ) -> tuple[Cells, NDArray[np.int64]]:
-    """The pulses of turn 0, and the range cells, whose centres lie in the patch."""
-    first = np.ceil(patch.from_azimuth_deg * DEG / antenna.step)
-    count = min(int(_width_deg(patch) * DEG / antenna.step) + 1, antenna.pulses)
-    pulses = (int(first) + np.arange(count)) % antenna.pulses
-    low, high = (np.array([patch.from_range_km, patch.to_range_km]) * KM / radar.cell_m - 0.5).tolist()
-    return pulses, np.arange(max(int(np.ceil(low)), 0), min(int(high) + 1, cells))
+    """The pulses of turn 0 and the range cells of a patch; patches side by side share none."""
+    first = round(patch.from_azimuth_deg * DEG / antenna.step)
+    count = min(round(_width_deg(patch) * DEG / antenna.step), antenna.pulses)
+    low, high = round(patch.from_range_km * KM / radar.cell_m), round(patch.to_range_km * KM / radar.cell_m)
+    return (first + np.arange(count)) % antenna.pulses, np.arange(low, min(high, cells))
 
 
 def _width_deg(patch: LandClutter) -> float:
