@@ -46,10 +46,16 @@ fail() { say "$@"; exit 1; }
 is_root() { [ "$(id -u)" -eq 0 ]; }
 has_apt() { command -v apt-get >/dev/null 2>&1; }
 
+# Once; a mirror that does not answer need not be the one that is wanted.
+apt_update() {
+    [ -z "${updated:-}" ] || return 0
+    DEBIAN_FRONTEND=noninteractive apt-get update -qq || say "apt-get update failed; trying all the same"
+    updated=yes
+}
+
 apt_install() {
     say "installing system packages: $*"
-    [ -n "${apt_updated:-}" ] || DEBIAN_FRONTEND=noninteractive apt-get update -qq || fail "apt-get update failed"
-    apt_updated=yes
+    apt_update
     DEBIAN_FRONTEND=noninteractive apt-get install -y -qq --no-install-recommends "$@" >/dev/null ||
         fail "apt-get could not install: $*"
 }
@@ -129,8 +135,7 @@ see_to_libraries() {
     look_for_libraries
     [ -n "$needed$wanted" ] || return 0
     if has_apt && is_root; then
-        DEBIAN_FRONTEND=noninteractive apt-get update -qq || fail "apt-get update failed"
-        apt_updated=yes
+        apt_update # before the names are looked up
         # shellcheck disable=SC2046,SC2086 # lists of packages
         apt_install $(named_here $needed $wanted)
         look_for_libraries
