@@ -314,6 +314,14 @@ def test_land_is_the_same_at_each_turn() -> None:
     assert max(float(np.ptp(amplitude)) for amplitude in by_place) < 10.0  # only noise of 1 differs
 
 
+def test_false_targets_at_north_are_lit_from_both_sides() -> None:
+    clutter = {"uniform": [{"density_per_km2": 0.01}]}
+    table = plots(list(simulator(radar={"p_fa": 1e-6}, clutter=clutter, duration_s=204.0).sectors()))
+    pulse = np.bincount(table["pulse"] % 1800, minlength=1800)
+    blocks = np.roll(pulse, 7).reshape(120, 15).sum(axis=1)  # the first is about north, 3° wide
+    assert abs(blocks[0] - blocks[1:].mean()) <= SIGMAS * blocks[1:].std()
+
+
 def test_points_are_single_returns() -> None:
     clutter = {"uniform": [{"per_cell": 0.01, "kind": "points"}]}
     table = plots(list(simulator(radar={"p_fa": 1e-9}, clutter=clutter).sectors()))
