@@ -86,13 +86,11 @@ def encoder_of_marks(time: Array, azimuth: Array, rotation: float) -> tuple[Enco
     """
     order = np.argsort(time, kind="stable")
     time, azimuth = time[order], azimuth[order]
-    phase = azimuth - TURN / rotation * time
-    stray = np.abs(wrap(phase - _smooth(time, phase, rotation))) > STRAY
+    stray = np.abs(wrap(azimuth - _steady(time, azimuth, rotation))) > STRAY
     if stray.all():
         stray[:] = False
-    time, azimuth, phase = time[~stray], azimuth[~stray], phase[~stray]
-    steady = np.unwrap(_smooth(time, phase, rotation)) + TURN / rotation * time
-    angle = unwrap_near(azimuth, steady)
+    time, azimuth = time[~stray], azimuth[~stray]
+    angle = unwrap_near(azimuth, _steady(time, azimuth, rotation))
     # North comes twice, as the north marker and as sector 0.
     knots = _increasing(time, angle)
     return Encoder(time[knots], angle[knots], rotation), int(stray.sum())
@@ -109,8 +107,11 @@ def encoder_of_reports(time: Array, azimuth: Array, rotation: float) -> Encoder:
     """
     order = np.argsort(time, kind="stable")
     time, azimuth = time[order], azimuth[order]
-    rate = TURN / rotation
-    steady = np.unwrap(_smooth(time, azimuth - rate * time, rotation)) + rate * time
+    steady = _steady(time, azimuth, rotation)
+    if time[-1] - time[0] > 2.0 * rotation:  # a stated rotation is nominal; the mean rate is better
+        centred = time - time.mean()
+        rate = float(centred @ (steady - steady.mean()) / (centred @ centred))
+        steady = _steady(time, azimuth, TURN / rate)
     # A knot every eighth of a turn: nearer ones would follow the noise of single reports.
     _, first = np.unique(np.floor(8.0 * (time - time[0]) / rotation), return_index=True)
     knots = first[_increasing(time[first], steady[first])]
@@ -129,8 +130,13 @@ def infer_rotation(time: Array, azimuth: Array) -> float | None:
     time : (n,) s
     azimuth : (n,) rad
     """
-    order = np.argsort(time, kind="stable")[:5000]
-    time, azimuth = time[order] - time[order[0]] if len(order) else time, azimuth[order]
+    order = np.argsort(time, kind="stable")
+    time, azimuth = time[order], azimuth[order]
+    if len(time) >= 4:
+        # Ten minutes tell enough, or so many reports; of dense ones some.
+        count = max(int(np.searchsorted(time, time[0] + 600.0)), 1000)
+        some = slice(0, count, -(-min(count, len(time)) // 5000))
+        time, azimuth = time[some] - time[0], azimuth[some]
     if len(time) < 4 or time[-1] < 2.0 * SHORTEST_TURN:
         return None
     longest = min(LONGEST_TURN, float(time[-1]) / 2.0)
@@ -168,6 +174,17 @@ def _drift(time: Array, azimuth: Array, rate: float, starts: NDArray[np.intp]) -
     unwrapped = unwrap_near(azimuth - rate * time, phase)
     centred = time - time.mean()
     return float(centred @ (unwrapped - unwrapped.mean()) / (centred @ centred))
+
+
+def _steady(time: Array, azimuth: Array, rotation: float) -> Array:
+    """The unwrapped angle of the beam at the times, (n,), averaged over the neighbours.
+
+    Smoothed twice, what was left over once more: that takes out the lean which a rate that is
+    slightly wrong gives a mean over neighbours that lie more to one side.
+    """
+    rate = TURN / rotation
+    once = np.unwrap(_smooth(time, azimuth - rate * time, rotation)) + rate * time
+    return once + _smooth(time, azimuth - once, rotation)
 
 
 def _smooth(time: Array, phase: Array, rotation: float) -> Array:

@@ -19,7 +19,13 @@ from numpy.typing import NDArray
 from radar_console.core.errors import InputError
 from radar_console.core.geometry import Array, unwrap_near, wrap
 from radar_console.core.messages import CENTROID, NO_CENTROIDS, PLOT, Radar, Sector, Table, blank
-from radar_console.core.rotation import Encoder, encoder_of_marks, encoder_of_reports, infer_rotation
+from radar_console.core.rotation import (
+    Encoder,
+    encoder_of_marks,
+    encoder_of_reports,
+    infer_rotation,
+    rotation_of_marks,
+)
 from radar_console.core.sweep import LONGEST_SILENCE, cut, first_turn, stated
 from radar_console.core.units import DEG, KM, TURN
 from radar_console.recording.columns import Columns, read_columns
@@ -187,6 +193,9 @@ class PlotTable:
         apart = np.abs(wrap(np.diff(azimuth)))[np.diff(time) == 0.0]
         stamped = len(apart) > 0.2 * len(time) and float(np.median(apart)) > SAME_BEAM
         inferred = None if stamped else infer_rotation(time, azimuth)
+        if self._raw and inferred is None:
+            _, pulses = np.unique(self._values["pulse"], return_index=True)
+            inferred = rotation_of_marks(time[pulses], azimuth[pulses])
         if stamped or (inferred is None and given is None and "scan" in self._values):
             self._stamps = np.unique(time) if stamped else self._scan_ends(time)
             steps = np.diff(self._stamps)
