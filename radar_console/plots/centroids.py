@@ -17,8 +17,12 @@ from radar_console.core.units import DEG, TURN
 from radar_console.plots.clusters import Clusters
 from radar_console.scenario import PlotSettings, RadarSettings
 
-VALLEY = 0.5
+VALLEY = 0.55
 """Two peaks are parted where the way between them sinks below this part of the lower peak."""
+
+RIM = 0.1
+"""Hits weaker than this part of the peak do not count in the extent: over the limits of a target is
+what is wide at its height, not what is strong. At −20 dB the two-way beam is 1.8 beam widths wide."""
 
 MOST_PARTS = 3
 """A cluster over the limits of a target is parted into at most so many; else it is land."""
@@ -59,12 +63,12 @@ def pulses_per_turn(radar: RadarSettings) -> int:
 
 
 def measure(clusters: Clusters, settings: PlotSettings, resolution: Resolution) -> Table:
-    """The centroids of clusters that have at least `min_hits` plots.
+    """The centroids of clusters.
 
     Parameters
     ----------
     clusters : each with at least `settings.min_hits` plots
-    settings : edge, split and the limits of a target
+    settings : edge, split, and the limits of a target
     resolution : of the radar
 
     Returns
@@ -161,14 +165,15 @@ def _parts(
     peak = np.empty(pulse.size, np.int64)
     for k in range(bounds.size - 1):
         a, b = bounds[k], bounds[k + 1]
-        pulses, cells = _extent(pulse[a:b], cell[a:b])
+        pulses, cells = _extent(pulse[a:b], cell[a:b], amplitude[a:b], RIM)
         large = cut[k] or pulses > most_pulses or cells > most_cells
         land = cut[k] or pulses > MOST_PARTS * most_pulses or cells > MOST_PARTS * most_cells
         if split and not land:
             part = _flood(pulse[a:b], cell[a:b], amplitude[a:b], gap, min_hits)
             peaks = np.unique(part)
             if peaks.size > 1 and (
-                not large or _are_targets(pulse[a:b], cell[a:b], part, peaks, most_pulses, most_cells)
+                not large
+                or _are_targets(pulse[a:b], cell[a:b], amplitude[a:b], part, peaks, most_pulses, most_cells)
             ):
                 peak[a:b] = part + a
                 flags[peaks + a] = SPLIT
@@ -180,21 +185,29 @@ def _parts(
 
 
 @njit(cache=True, nogil=True)
-def _extent(pulse: Ints, cell: NDArray[np.int32]) -> tuple[int, int]:
-    """How many pulses and cells the plots span."""
+def _extent(pulse: Ints, cell: NDArray[np.int32], amplitude: Floats, rim: float) -> tuple[int, int]:
+    """How many pulses and cells the plots span that are not weaker than a part of the peak."""
+    seen = amplitude >= rim * np.max(amplitude)
+    pulse, cell = pulse[seen], cell[seen]
     return int(np.max(pulse) - np.min(pulse) + 1), int(np.max(cell) - np.min(cell) + 1)
 
 
 @njit(cache=True, nogil=True)
 def _are_targets(
-    pulse: Ints, cell: NDArray[np.int32], part: Ints, peaks: Ints, most_pulses: int, most_cells: int
+    pulse: Ints,
+    cell: NDArray[np.int32],
+    amplitude: Floats,
+    part: Ints,
+    peaks: Ints,
+    most_pulses: int,
+    most_cells: int,
 ) -> bool:
     """The parts of a large cluster are few, and none is large itself."""
     if peaks.size > MOST_PARTS:
         return False
     for strongest in peaks:
         own = part == strongest
-        pulses, cells = _extent(pulse[own], cell[own])
+        pulses, cells = _extent(pulse[own], cell[own], amplitude[own], RIM)
         if pulses > most_pulses or cells > most_cells:
             return False
     return True
@@ -213,7 +226,7 @@ def _flood(pulse: Ints, cell: NDArray[np.int32], amplitude: Floats, gap: int, mi
     J. ACM 60(6), 2013; with a ratio in place of their difference. Neighbours are those of the
     clustering, so a single faded pulse is no valley.
     """
-    rows, columns = _extent(pulse, cell)
+    rows, columns = _extent(pulse, cell, amplitude, 0.0)
     row, column = pulse - np.min(pulse), cell - np.min(cell)
     above = np.full((rows, columns), -1)  # the plot that has surfaced there
     root = np.arange(pulse.size)

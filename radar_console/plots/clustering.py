@@ -3,7 +3,7 @@
 import math
 from collections.abc import Iterable, Iterator
 
-from radar_console.core.messages import NO_PLOTS, CentroidFlag, Sector
+from radar_console.core.messages import NO_CENTROIDS, NO_PLOTS, CentroidFlag, Sector
 from radar_console.core.units import KM, TURN
 from radar_console.plots.centroids import Resolution, measure, pulses_per_turn
 from radar_console.plots.clusters import Clusters, StreamingClusters
@@ -15,7 +15,7 @@ class Clustering:
 
     A sector gets the centroids of the clusters that closed in it. Its `complete` is half a pulse before
     the first plot of the oldest cluster that is still open, so no later centroid lies below it. When
-    the stream ends with clusters open, they follow in a last sector without extent. Sectors of a
+    the stream ends, what is still open follows in a last sector without extent. Sectors of a
     source that delivers centroids itself pass untouched.
 
     A pulse's unwrapped angle is 2π · pulse / pulses_per_turn.
@@ -36,12 +36,16 @@ class Clustering:
         cells = math.ceil(radar_settings.max_range_km * KM / radar_settings.cell_m) + 1
         # Twice the limit: a cluster is cut only where it is flagged anyway, never a strong target.
         longest = max(2 * settings.land_pulses, settings.gap_pulses + 1)
-        self._clusters = StreamingClusters(cells, settings.gap_pulses, longest)
-        self.plots = self.too_small = self.centroids = self.extended = self.split = 0
+        self._clusters = StreamingClusters(cells, settings.gap_pulses, longest, settings.min_hits)
+        self.plots = self.centroids = self.extended = self.split = 0
 
     @property
     def late(self) -> int:
         return self._clusters.late
+
+    @property
+    def too_small(self) -> int:
+        return self._clusters.too_small
 
     def __call__(self, sectors: Iterable[Sector]) -> Iterator[Sector]:
         last: Sector | None = None
@@ -62,13 +66,13 @@ class Clustering:
         return self._with_centroids(sector, closed, complete)
 
     def _ended(self, last: Sector) -> Sector:
-        nothing = last.adding(start=last.stop, begin=last.end, plots=NO_PLOTS)
+        nothing = last.adding(start=last.stop, begin=last.end, plots=NO_PLOTS, centroids=NO_CENTROIDS)
         return self._with_centroids(nothing, self._clusters.flush(), last.end)
 
     def _with_centroids(self, sector: Sector, closed: Clusters, complete: float) -> Sector:
-        clusters = closed.of_at_least(self._settings.min_hits)
-        self.too_small += len(closed) - len(clusters)
-        centroids = measure(clusters, self._settings, self._resolution)
+        if not len(closed):
+            return sector.adding(complete=complete)
+        centroids = measure(closed, self._settings, self._resolution)
         self.centroids += len(centroids)
         self.extended += int(((centroids["flags"] & CentroidFlag.EXTENDED) > 0).sum())
         self.split += int(((centroids["flags"] & CentroidFlag.SPLIT) > 0).sum())

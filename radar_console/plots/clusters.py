@@ -36,18 +36,6 @@ class Clusters:
     def __len__(self) -> int:
         return len(self.cut)
 
-    @property
-    def hits(self) -> NDArray[np.int64]:
-        """(clusters,) the number of plots of each."""
-        return np.diff(self.bounds)
-
-    def of_at_least(self, hits: int) -> "Clusters":
-        """The clusters with at least so many plots."""
-        sizes = self.hits
-        large = sizes >= hits
-        bounds = np.concatenate(([0], np.cumsum(sizes[large])))
-        return Clusters(self.plots[np.repeat(large, sizes)], bounds, self.cut[large])
-
 
 class StreamingClusters:
     """Joins plots to clusters, sector by sector.
@@ -58,14 +46,20 @@ class StreamingClusters:
     gap : largest step in pulses between neighbours
     longest : pulses; a plot does not join a cluster that began so many pulses before it. The
         cluster goes on in a new part, and both are marked as cut, so land can't stay open for long
+    min_hits : smaller clusters are dropped when they close, and counted
+
+    Attributes
+    ----------
+    swept : every plot of an earlier pulse has been seen
+    too_small : clusters dropped for want of plots
+    late : plots left out since they came after their pulse was swept
     """
 
-    def __init__(self, cells: int, gap: int, longest: int) -> None:
+    def __init__(self, cells: int, gap: int, longest: int, min_hits: int = 1) -> None:
         if longest <= gap:
             raise ValueError(f"longest is {longest} pulses, expected more than the gap of {gap}")
-        self.gap, self.longest = gap, longest
-        self.swept = 0  # every plot of an earlier pulse has been seen
-        self.late = 0  # plots that came after their pulse was swept, and were left out
+        self.gap, self.longest, self.min_hits = gap, longest, min_hits
+        self.swept = self.too_small = self.late = 0
         # One cell more on either side, so that every cell has two neighbours.
         self._newest_pulse = np.full(cells + 2, _NEVER)
         self._newest_plot = np.zeros(cells + 2, np.int64)
@@ -82,7 +76,7 @@ class StreamingClusters:
         return min(self.swept, int(self._open["pulse"][0])) if len(self._open) else self.swept
 
     def push(self, plots: Table, swept: int) -> Clusters:
-        """Add plots; return the clusters that can't grow any more, in the order of their first plot.
+        """Add plots; return the clusters that can grow no more, in the order of their first plot.
 
         Parameters
         ----------
@@ -101,9 +95,11 @@ class StreamingClusters:
         cut = np.concatenate((self._cut, np.zeros(len(plots), np.bool_)))
         _join(pulse, cell, begin, root, cut, self._newest_pulse, self._newest_plot, self.gap, self.longest)
         self.swept = max(self.swept, swept)
-        closed = _closed(pulse, root, self.swept - self.gap)
+        closed, hits = _closed(pulse, root, self.swept - self.gap)
         self._keep(pool, root, cut, ~closed)
-        return _grouped(pool, root, cut, closed)
+        large = hits >= self.min_hits
+        self.too_small += int(np.count_nonzero(closed & ~large & (root == np.arange(len(root)))))
+        return _grouped(pool, root, cut, closed & large)
 
     def flush(self) -> Clusters:
         """The clusters that are still open: the stream has ended."""
@@ -120,9 +116,11 @@ class StreamingClusters:
             self._newest_pulse = np.pad(self._newest_pulse, (0, missing), constant_values=_NEVER)
             self._newest_plot = np.pad(self._newest_plot, (0, missing))
         late = plots["pulse"] < self.swept
-        self.late += int(late.sum())
-        plots = plots[~late]
-        return plots[np.lexsort((plots["cell"], plots["pulse"]))]
+        if late.any():
+            self.late += int(late.sum())
+            plots = plots[~late]
+        order = np.lexsort((plots["cell"], plots["pulse"]))
+        return plots if (order[1:] > order[:-1]).all() else plots[order]
 
     def _keep(
         self, pool: Table, root: NDArray[np.int64], cut: NDArray[np.bool_], kept: NDArray[np.bool_]
@@ -177,12 +175,15 @@ def _join(
 
 
 @njit(cache=True, nogil=True)
-def _closed(pulse: NDArray[np.int64], root: NDArray[np.int64], before: int) -> NDArray[np.bool_]:
-    """Of each plot: the newest plot of its cluster is from a pulse before `before`."""
-    last = np.zeros_like(pulse)
+def _closed(
+    pulse: NDArray[np.int64], root: NDArray[np.int64], before: int
+) -> tuple[NDArray[np.bool_], NDArray[np.int64]]:
+    """Of each plot's cluster: its newest plot is from a pulse before `before`; its number of plots."""
+    last, hits = np.zeros_like(pulse), np.zeros_like(pulse)
     for plot in range(pulse.size):  # in the order of pulses, so the newest comes last
         last[root[plot]] = pulse[plot]
-    return last[root] < before
+        hits[root[plot]] += 1
+    return last[root] < before, hits[root]
 
 
 def _grouped(
@@ -191,6 +192,5 @@ def _grouped(
     """Bring the chosen plots of each cluster together."""
     index = np.flatnonzero(chosen)
     index = index[np.argsort(root[index], kind="stable")]
-    roots = root[index]
-    starts = np.flatnonzero(np.diff(roots, prepend=-1))
-    return Clusters(pool[index], np.append(starts, len(index)), cut[roots[starts]])
+    roots, starts = np.unique(root[index], return_index=True)
+    return Clusters(pool[index], np.append(starts, len(index)), cut[roots])

@@ -63,7 +63,7 @@ def test_stream_equals_connected_components(places: list[tuple[int, int]], gap: 
 @pytest.mark.parametrize("pulses", [1, 25, 57, 450, 3600])
 def test_noise_of_two_turns_in_sectors_of_any_size(pulses: int) -> None:
     rng = np.random.default_rng(1)
-    hit = rng.random((3600, 40)) < 0.08
+    hit = rng.random((3600, 16)) < 0.1
     plots = table([(int(p), int(c)) for p, c in np.argwhere(hit)])
     clusters = streamed(plots, 2, [*range(pulses, 3600 + pulses, pulses)])
     expected = components(plots, 2)
@@ -104,14 +104,13 @@ def test_plots_come_in_any_order_within_a_sector_and_late_ones_are_counted() -> 
     assert clusters.late == 1
 
 
-def test_small_clusters_can_be_left_out() -> None:
-    clusters = StreamingClusters(20, gap=2, longest=40)
+def test_small_clusters_are_dropped_and_counted() -> None:
+    clusters = StreamingClusters(20, gap=2, longest=40, min_hits=2)
     clusters.push(table([(1, 3), (1, 9), (2, 9), (3, 10), (3, 15), (4, 15)]), 1)
     closed = clusters.flush()
-    assert closed.hits.tolist() == [1, 3, 2]
-    large = closed.of_at_least(2)
-    assert large.hits.tolist() == [3, 2]
-    assert large.plots["ordinal"].tolist() == [1, 2, 3, 4, 5]
+    assert closed.bounds.tolist() == [0, 3, 5]
+    assert closed.plots["ordinal"].tolist() == [1, 2, 3, 4, 5]
+    assert clusters.too_small == 1
 
 
 def test_impossible_values_are_refused() -> None:
