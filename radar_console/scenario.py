@@ -291,6 +291,9 @@ class TrackerSettings(Settings):
     max_speed_mps: Annotated[Positive, Field(description="gate of the two-point start")] = 400.0
     confirm_hits: Annotated[Count, Field(description="M of M-of-N")] = 3
     confirm_passes: Annotated[Count, Field(description="N of M-of-N")] = 5
+    confirm_score: Annotated[
+        Finite, Field(description="also needed: log-likelihood ratio of a target against clutter")
+    ] = 6.9
     delete_misses: Annotated[
         Count, Field(description="a confirmed track is deleted after so many misses in a row")
     ] = 6

@@ -1,0 +1,315 @@
+"""The tracker as a stage of the chain: sectors in, sectors with track rows out.
+
+The stream is cut again into bins of fixed angles, so how it came cut has no influence on the
+tracks, not in one bit: a bin is processed once the watermark `Sector.complete` has passed its end.
+"""
+
+import math
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from radar_console.core.geometry import ground_range
+from radar_console.core.messages import CENTROID, TRACK, CentroidFlag, Radar, Sector, Table
+from radar_console.core.units import TURN
+from radar_console.estimation.gaussian import Array
+from radar_console.estimation.measurement import from_polar
+from radar_console.estimation.particle import normals
+from radar_console.scenario import TrackerSettings
+from radar_console.tracker import clutter, gating
+from radar_console.tracker.records import (
+    BEAM,
+    COUNTS,
+    EDGE,
+    N_EDGES,
+    N_POOL,
+    N_QUEUE,
+    N_ROWS,
+    N_SLOTS,
+    N_TRACKS,
+    PARAMETERS,
+    PENDING,
+    SIZES,
+    STATE,
+)
+from radar_console.tracker.sweep import sweep
+
+_GRID = 2.0**20  # per s and per m: interpolated values are rounded, so that no cut shows in them
+_LOG = 4096  # sectors that are remembered, to find where the beam was
+_FEW_TURNS = 4
+
+
+@dataclass(slots=True)
+class Counts:
+    """What the tracker did, and what it had to leave."""
+
+    centroids: int = 0
+    invalid: int = 0  # centroids with a range, azimuth or time that is no number
+    late: int = 0  # centroids below the watermark: their bin was closed
+    extended: int = 0  # centroids that could not start a track: wider than a target
+    started: int = 0
+    confirmed: int = 0
+    deleted: int = 0  # before they were confirmed
+    lost: int = 0  # confirmed tracks that were deleted
+    forced: int = 0  # clusters that were closed before all their members were served
+    approximate: int = 0  # updates whose association was past the exact algorithm's budget
+    blanked: int = 0  # passes over sectors where the radar did not look
+    clock_back: int = 0  # sectors whose time went back
+    beam_back: int = 0  # sectors whose angle went back
+
+
+_SWEPT_COUNTS = ("started", "confirmed", "deleted", "lost", "forced", "approximate", "extended", "blanked")
+
+
+class Tracker:
+    """Particle filter and JPDA, fed by the beam.
+
+    Parameters
+    ----------
+    settings, radar : the scenario's [tracker], and the sensor
+    seed : of all random numbers
+    """
+
+    def __init__(self, settings: TrackerSettings, radar: Radar, seed: int) -> None:
+        self.settings, self.radar, self.counts = settings, radar, Counts()
+        self._par = _parameters(settings, radar, seed)[0]
+        self._table = normals()
+        self._clutter = clutter.empty_map()
+        self._size, self._need = np.zeros(SIZES, np.int64), np.zeros(SIZES, np.int64)
+        self._swept = np.zeros(COUNTS, np.int64)
+        self._tracks = np.zeros(64, STATE)
+        self._pool, self._edges = np.zeros(64, PENDING), np.zeros(256, EDGE)
+        self._rows = np.zeros(256, TRACK)
+        self._particles = np.zeros((16, 4, settings.particles), np.float32)
+        self._weights = np.zeros((16, settings.particles), np.float32)
+        self._owner = np.zeros(16, np.int64)
+        self._blank = np.zeros(settings.bins, np.bool_)
+        self._queue = np.zeros(0, PENDING)
+        self._log = _BeamLog()
+        self._next_bin: int | None = None
+        self._last: Sector | None = None
+
+    def __call__(self, sectors: Iterable[Sector]) -> Iterator[Sector]:
+        """Add the rows of all services to the sectors that completed them."""
+        for sector in sectors:
+            yield self.push(sector)
+        last = self.flush()
+        if last is not None:
+            yield last
+
+    def push(self, sector: Sector) -> Sector:
+        """The sector, with a row for each track that was served by it, hit or missed."""
+        self.counts.clock_back += self._log.time_after(sector.start) or sector.stop < sector.start
+        self.counts.beam_back += self._log.angle_after(sector.end) or sector.end < sector.begin
+        self._log.append(sector)
+        if self._next_bin is None:
+            self._next_bin = math.floor(self._log.angle[0] / self._par["bin"]) + 1
+            self._clutter[0]["last"] = math.floor(self._log.angle[0] / TURN * clutter.COLUMNS)
+        self._skip_long_gap()
+        if len(sector.centroids):
+            self._take(sector)
+        self._last = sector
+        return sector.adding(tracks=self._run(min(sector.complete, self._log.angle[-1]), final=False))
+
+    def flush(self) -> Sector | None:
+        """What is pending at the end of a stream, as one more sector; None if there is nothing."""
+        if self._last is None:
+            return None
+        end = float(self._log.angle[-1])
+        rows = self._run(end, final=True)
+        if not len(rows):
+            return None
+        stop = float(self._log.time[-1])
+        return Sector(self.radar, stop, stop, end, end, end, self._last.position, tracks=rows)
+
+    def _take(self, sector: Sector) -> None:
+        """Put a sector's centroids into the queue, in the order of their angles."""
+        table = sector.centroids
+        self.counts.centroids += len(table)
+        good = np.isfinite(table["range"]) & np.isfinite(table["azimuth"]) & np.isfinite(table["time"])
+        good &= table["range"] >= 0
+        self.counts.invalid += len(table) - int(good.sum())
+        plots = self._pending(table[good])
+        late = plots["phi"] < (self._next_bin_number - 1) * self._par["bin"]
+        self.counts.late += int(late.sum())
+        self._queue = np.concatenate([self._queue[self._size[N_QUEUE] :], plots[~late]])
+        self._size[N_QUEUE] = 0
+        self._queue = self._queue[
+            np.lexsort((self._queue["ordinal"], self._queue["range"], self._queue["phi"]))
+        ]
+
+    def _pending(self, table: Table) -> Table:
+        """Centroids as positions in the site's plane."""
+        plots = np.zeros(len(table), PENDING)
+        angle, (east, north, up) = self._log.at_time(table["time"])
+        azimuth = table["azimuth"]
+        plots["phi"] = azimuth + TURN * np.round((angle - azimuth) / TURN)
+        above_sea = up + (self.radar.site.height if self.radar.site else 0.0)
+        plots["range"] = ground_range(table["range"], table["height"], above_sea)
+        for name in ("sd_range", "sd_azimuth"):
+            claimed = table[name]
+            plots[name] = np.where(np.isfinite(claimed) & (claimed > 0), claimed, self._par[name])
+        z = from_polar(plots["range"], azimuth, plots["sd_range"], plots["sd_azimuth"])
+        plots["e"], plots["n"] = z.mean[:, 0] + east, z.mean[:, 1] + north
+        plots["ee"], plots["en"], plots["nn"] = z.cov[:, 0, 0], z.cov[:, 0, 1], z.cov[:, 1, 1]
+        plots["t"], plots["ordinal"], plots["mode_3a"] = table["time"], table["ordinal"], table["mode_3a"]
+        plots["extended"] = table["flags"] & np.uint32(CentroidFlag.EXTENDED) != 0
+        plots["weight"] = plots["clutter"] = 1.0
+        return plots
+
+    @property
+    def _next_bin_number(self) -> int:
+        assert self._next_bin is not None
+        return self._next_bin
+
+    def _skip_long_gap(self) -> None:
+        """Whole turns that nobody saw: the tracks' angles go with the beam, and nothing is counted."""
+        gap = (
+            self._log.angle[-2] - self._next_bin_number * self._par["bin"]
+            if len(self._log.angle) > 1
+            else 0.0
+        )
+        turns = math.floor(gap / TURN)
+        if turns >= _FEW_TURNS:
+            self._tracks["psi"] += turns * TURN
+            self._tracks["wake_angle"] = -np.inf
+            self._next_bin = self._next_bin_number + turns * self.settings.bins
+
+    def _run(self, complete: float, final: bool) -> Table:
+        """Serve the bins below the watermark; the rows of what was served."""
+        first, width = self._next_bin_number, float(self._par["bin"])
+        stop = first
+        while stop * width <= complete:
+            stop += 1
+        if final:
+            stop += 1  # the bin in which the stream ends
+        if stop == first:
+            return np.zeros(0, TRACK)
+        beams = self._log.bins(np.arange(first - 1, stop) * width)
+        rows: list[Table] = []
+        done = 0
+        while done < len(beams):
+            done += sweep(
+                beams[done:], self._par, self._table, self._clutter[0], self._queue, self._tracks, self._pool,
+                self._edges, self._particles, self._weights, self._owner, self._blank, self._rows, self._size,
+                self._need, self._swept, final,
+            )  # fmt: skip
+            rows.append(self._rows[: self._size[N_ROWS]].copy())
+            self._size[N_ROWS] = 0
+            if done < len(beams):
+                self._grow()
+        self._next_bin = stop
+        for name, value in zip(_SWEPT_COUNTS, self._swept, strict=True):
+            setattr(self.counts, name, int(value))
+        return rows[0] if len(rows) == 1 else np.concatenate(rows)
+
+    def _grow(self) -> None:
+        """Make room for the next bin, and for some more."""
+        need = self._need
+        self._tracks, self._pool = _longer(self._tracks, need[N_TRACKS]), _longer(self._pool, need[N_POOL])
+        self._rows, self._edges = _longer(self._rows, need[N_ROWS]), _longer(self._edges, need[N_EDGES])
+        self._particles = _longer(self._particles, need[N_SLOTS])
+        self._weights = _longer(self._weights, need[N_SLOTS])
+        self._owner = _longer(self._owner, need[N_SLOTS])
+
+
+class _BeamLog:
+    """Where the beam and the sensor were: edges of the sectors, in the order of angle and of time."""
+
+    def __init__(self) -> None:
+        self.time, self.angle = np.zeros(0), np.zeros(0)
+        self._position = np.zeros((0, 3))
+        self._seen = np.zeros(0, np.bool_)  # the radar looked between the edge before and this one
+
+    def time_after(self, time: float) -> bool:
+        return len(self.time) > 0 and time < self.time[-1]
+
+    def angle_after(self, angle: float) -> bool:
+        return len(self.angle) > 0 and angle < self.angle[-1]
+
+    def append(self, sector: Sector) -> None:
+        """Time and angle that go back are held where they were."""
+        if len(self.time) == 0 or sector.begin > self.angle[-1] + 1e-9:
+            self._add(sector.start, sector.begin, sector.position, False)
+        self._add(sector.stop, sector.end, sector.position, True)
+
+    def _add(self, time: float, angle: float, position: tuple[float, float, float], seen: bool) -> None:
+        if len(self.time):
+            time, angle = max(time, float(self.time[-1])), max(angle, float(self.angle[-1]))
+        keep = slice(-_LOG, None) if len(self.time) >= 2 * _LOG else slice(None)
+        self.time = np.append(self.time[keep], time)
+        self.angle = np.append(self.angle[keep], angle)
+        self._position = np.append(self._position[keep], [position], axis=0)
+        self._seen = np.append(self._seen[keep], seen)
+
+    def at_time(self, time: Array) -> tuple[Array, Array]:
+        """Angle (n,) of the beam and position (3, n) of the sensor."""
+        angle = np.interp(time, self.time, self.angle)
+        position = [np.interp(time, self.time, column) for column in self._position.T]
+        return angle, np.round(np.array(position) * _GRID) / _GRID
+
+    def bins(self, edges: Array) -> Any:
+        """The bins between `edges` (n + 1,), as a BEAM table (n,)."""
+        beams = np.zeros(len(edges) - 1, BEAM)
+        t = np.round(np.interp(edges, self.angle, self.time) * _GRID) / _GRID
+        beams["phi"], beams["t"], beams["step"] = edges[1:], t[1:], np.diff(t)
+        for name, column in (("e", 0), ("n", 1)):
+            values = np.interp(edges[1:], self.angle, self._position[:, column])
+            beams[name] = np.round(values * _GRID) / _GRID
+        middle = np.searchsorted(self.angle, 0.5 * (edges[1:] + edges[:-1]))
+        beams["seen"] = self._seen[np.minimum(middle, len(self._seen) - 1)]
+        return beams
+
+
+def warm_up() -> None:
+    """Compile all kernels, or load them from their cache, by tracking two targets for a moment."""
+    radar = Radar("", 4.0, 1000.0, 1.0, 0.01)
+    tracker = Tracker(TrackerSettings(particles=10), radar, 0)
+    for turn in range(8):
+        centroids = np.zeros(2, CENTROID)
+        centroids["ordinal"] = 2 * turn, 2 * turn + 1
+        centroids["time"], centroids["azimuth"] = 4.0 * turn + 1.0, 0.5 * math.pi
+        centroids["range"], centroids["height"] = (500.0, 501.0), np.nan
+        tracker.push(Sector(radar, 4.0 * turn, 4.0 * turn + 4.0, TURN * turn, TURN * (turn + 1),
+                            TURN * (turn + 1), centroids=centroids))  # fmt: skip
+    tracker.flush()
+
+
+def _parameters(settings: TrackerSettings, radar: Radar, seed: int) -> NDArray[np.void]:
+    """The settings as the compiled sweep reads them, in SI."""
+    par = np.zeros(1, PARAMETERS)
+    density = settings.clutter_per_km2
+    values = {
+        "seed": seed,
+        "p_d": settings.p_d,
+        "p_g": settings.gate_probability,
+        "gate": gating.threshold(settings.gate_probability),
+        "q": settings.process_noise_m2ps3,
+        "clutter": np.nan if density is None else density * 1e-6,
+        "max_speed": settings.max_speed_mps,
+        "confirm_hits": settings.confirm_hits,
+        "confirm_passes": settings.confirm_passes,
+        "confirm_score": settings.confirm_score,
+        "delete_misses": settings.delete_misses,
+        "resample_below": settings.resample_below,
+        "wait": math.radians(settings.wait_deg),
+        "bin": TURN / settings.bins,
+        "max_range": radar.max_range,
+        "sd_range": radar.sd_range,
+        "sd_azimuth": radar.sd_azimuth,
+    }
+    for name, value in values.items():
+        par[0][name] = value
+    return par
+
+
+def _longer(table: Any, count: int) -> Any:
+    """The same rows, and room for at least `count`."""
+    if len(table) >= count:
+        return table
+    result = np.zeros((max(count, 2 * len(table)), *table.shape[1:]), table.dtype)
+    result[: len(table)] = table
+    return result
