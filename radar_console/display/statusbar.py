@@ -7,13 +7,15 @@ gets a digit more.
 from dataclasses import dataclass
 
 from PySide6.QtCore import Qt
-from PySide6.QtWidgets import QHBoxLayout, QLabel, QSizePolicy, QWidget
+from PySide6.QtGui import QResizeEvent
+from PySide6.QtWidgets import QHBoxLayout, QLabel, QWidget
 
 from radar_console.display import fonts, quantities
 
 OLD_S, TOO_OLD_S = 1.0, 3.0  # age of the newest data: a warning, an alarm
 DEEP = 32  # waiting sectors: a warning
 HEIGHT = 34
+_MARGIN, _SPACING = 20, 26
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,6 +63,7 @@ class StatusBar(QWidget):
         self.setObjectName("status")
         self.setAttribute(Qt.WidgetAttribute.WA_StyledBackground)
         self.setFixedHeight(HEIGHT)
+        self.setMinimumWidth(1)  # a longer text must not push the window wider
         self.moment = self._field("+0:00:00")
         self.rate = self._field("×0.25")
         self.rotation = self._field("15.0 rpm")
@@ -73,15 +76,13 @@ class StatusBar(QWidget):
         self.depth_field = self._field("queue 64")
         self.drops = self._field("")
         layout = QHBoxLayout(self)
-        layout.setContentsMargins(20, 0, 20, 0)
-        layout.setSpacing(26)
+        layout.setContentsMargins(_MARGIN, 0, _MARGIN, 0)
+        layout.setSpacing(_SPACING)
         for label in (self.moment, self.rate, self.rotation, self.scale, self.cursor_field):
             layout.addWidget(label)
         layout.addStretch(1)
         for label in (self.reduced, self.tracker, self.fps, self.age, self.depth_field, self.drops):
             layout.addWidget(label)
-        self.cursor_field.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Preferred)
-        layout.setStretchFactor(self.cursor_field, 6)
 
     def show_status(self, status: Status) -> None:
         """Write every field."""
@@ -90,7 +91,7 @@ class StatusBar(QWidget):
         _write(self.rate, f"{quantities.factor(status.rate)} {state}".strip(), "warning" if state else "")
         self._show_rotation(status)
         _write(self.scale, f"{self.tr('range')} {status.range_scale}")
-        self.show_cursor(status.cursor)
+        _write(self.cursor_field, status.cursor)
         _write(self.reduced, status.reduced, "warning")
         _write(self.tracker, status.tracker)
         _write(self.fps, f"{status.fps:.0f} fps" if status.fps == status.fps else "", "dim")
@@ -101,10 +102,30 @@ class StatusBar(QWidget):
             "warning" if status.depth >= DEEP else "dim",
         )
         self._show_drops(status)
+        self._fit()
+
+    def _fit(self) -> None:
+        """Where the window is narrow, what can be missed gives way; never the drops."""
+        fields = self.findChildren(QLabel)
+        for label in fields:
+            label.setVisible(bool(label.text()))
+        shown = [label for label in fields if label.text()]
+        needed = 2 * _MARGIN + sum(label.sizeHint().width() + _SPACING for label in shown)
+        for label in (self.tracker, self.reduced, self.fps, self.cursor_field, self.scale, self.rotation):
+            if needed <= self.width():
+                break
+            if label in shown and label.property("state") != "alarm":
+                label.hide()
+                needed -= label.sizeHint().width() + _SPACING
+
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        super().resizeEvent(event)
+        self._fit()
 
     def show_cursor(self, text: str) -> None:
         """Only the field of the cursor, which follows the pointer at once."""
         _write(self.cursor_field, text)
+        self._fit()
 
     def _show_rotation(self, status: Status) -> None:
         if status.stalled:

@@ -19,8 +19,6 @@ QSplitter::handle {{ background: {code(p.hairline)}; }}
 #figures, #value, #hint, #status QLabel {{ font-family: "{MONO}"; }}
 #value {{ color: {code(p.text)}; }}
 #name {{ color: {code(p.bright)}; font-size: {LARGE}px; font-weight: bold; }}
-#title {{ color: {code(p.bright)}; font-size: {LARGE}px; font-weight: bold; }}
-#subtitle {{ color: {code(p.dim)}; }}
 #line {{ background: {code(p.hairline)}; }}
 #status {{ background: {code(p.panel)}; border-top: 1px solid {code(p.hairline)}; }}
 #status QLabel[state="dim"] {{ color: {code(p.dim)}; }}
@@ -35,14 +33,15 @@ QLineEdit {{ background: {field}; border: none; border-bottom: 1px solid {code(p
 QLineEdit:focus {{ border-bottom-color: {code(p.dim)}; }}
 QTableView {{ background: {code(p.panel)}; border: none; font-family: "{MONO}"; outline: none;
   selection-background-color: {row}; selection-color: {code(p.bright)}; }}
-QTableView::item {{ padding: 0 10px 0 10px; border: none; }}
+QTableView::item {{ padding: 0 0 0 7px; border: none; }}
 QTableView::item:selected {{ background: {row}; }}
 QHeaderView {{ background: {code(p.panel)}; border: none; }}
 QHeaderView::section {{ background: {code(p.panel)}; color: {code(p.dim)}; border: none;
-  border-bottom: 1px solid {code(p.hairline)}; padding: 4px 10px 4px 10px; }}
+  border-bottom: 1px solid {code(p.hairline)}; padding: 4px 3px 4px 10px; }}
 QHeaderView::up-arrow, QHeaderView::down-arrow {{ width: 0; height: 0; }}
 QScrollBar:vertical {{ background: {code(p.panel)}; width: 8px; margin: 0; }}
 QScrollBar::handle:vertical {{ background: {code(p.hairline)}; min-height: 24px; border-radius: 4px; }}
+QScrollBar[idle="true"]::handle:vertical {{ background: none; }}
 QScrollBar::add-line, QScrollBar::sub-line, QScrollBar::add-page, QScrollBar::sub-page
   {{ height: 0; background: none; }}
 QToolTip {{ background: {code(p.panel)}; color: {code(p.text)}; border: 1px solid {code(p.hairline)}; }}

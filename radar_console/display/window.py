@@ -35,6 +35,8 @@ SLOW_MS = 333  # tables and figures
 MESSAGE_MS = 2500
 LONGEST_STEP = 0.25  # s of wall time that a late frame may advance the afterglow by
 MAP_REACH = 2.0  # of the instrumented range: what an off-centre view can show
+NARROWEST_PANEL = 440  # px
+WIDEST_PANEL = 0.42  # of the window
 _PANEL_MARGIN = 24
 
 
@@ -105,7 +107,7 @@ class ConsoleWindow(QMainWindow):
         panel = QWidget()
         panel.setObjectName("panel")
         panel.setAttribute(Qt.WidgetAttribute.WA_StyledBackground)
-        panel.setMinimumWidth(420)
+        panel.setMinimumWidth(NARROWEST_PANEL)
         line = QFrame()
         line.setObjectName("line")
         line.setFixedHeight(1)
@@ -121,6 +123,7 @@ class ConsoleWindow(QMainWindow):
         """What is written over the scope: keys, and a banner when something is the matter."""
         self.hint = self._note("hint", "")
         self.banner = self._note("banner", "")
+        self.banner.setWordWrap(True)
         self._message_over = QTimer(self, singleShot=True, interval=MESSAGE_MS)
         self._message_over.timeout.connect(self._show_hint)
         self._show_hint()
@@ -395,12 +398,15 @@ class ConsoleWindow(QMainWindow):
         return "", ""
 
     def _place_notes(self) -> None:
+        """In the corners, which the disc leaves free."""
         width, height = self.scope.width(), self.scope.height()
-        for label in (self.hint, self.banner):
-            label.adjustSize()
+        self.hint.adjustSize()
         self.hint.move(20, height - self.hint.height() - 14)
-        self.banner.setMaximumWidth(max(width - 40, 100))
-        self.banner.move((width - self.banner.width()) // 2, 56)
+        self.banner.setFixedWidth(
+            min(self.banner.fontMetrics().horizontalAdvance(self.banner.text()) + 40, width // 3)
+        )
+        self.banner.setFixedHeight(self.banner.heightForWidth(self.banner.width()))
+        self.banner.move(width - self.banner.width() - 20, 16)
 
     # ---- The pointer
 
@@ -438,6 +444,9 @@ class ConsoleWindow(QMainWindow):
     def resizeEvent(self, event: QResizeEvent) -> None:
         super().resizeEvent(event)
         self.help.place()
+        most = max(round(WIDEST_PANEL * self.width()), NARROWEST_PANEL)
+        if self.splitter.sizes()[1] > most:
+            self.splitter.setSizes([self.width() - most, most])
 
     def closeEvent(self, event: QCloseEvent) -> None:
         self.frames.stop()
