@@ -27,7 +27,7 @@ MAP_STYLES: dict[str, tuple[str, strokes.Dash]] = {
 
 _MOST_RINGS = 100
 _TICK, _LONG_TICK = 5.0, 9.0  # px
-_BEARING_OUT = 20.0  # px from the rim to the middle of a bearing's figures
+_BEARING_OUT = 25.0  # px from the rim to the middle of a bearing's figures
 _INSET = 18.0  # px from the edge of the screen, where a spoke leaves it
 
 

@@ -105,15 +105,17 @@ def _mark_lines(on: Board, x0: Floats, y0: Floats, x1: Floats, y1: Floats, weigh
 
 
 @njit(cache=True, nogil=True)
-def _cost(on: Board, left: float, top: float, width: float, height: float) -> int:
-    """What a box would cover; more than anything allowed if it leaves the screen."""
+def _cost(on: Board, left: float, top: float, width: float, height: float, limit: int) -> int:
+    """What a box would cover, counted until it passes `limit`; much, if it leaves the screen."""
     rows, columns = on.shape
     if left < 0 or top < 0 or left + width >= columns * CELL or top + height >= rows * CELL:
-        return 10 * _LABEL
+        return 15 * _LABEL
     total = 0
     for i in range(int(top) // CELL, int(top + height) // CELL + 1):
         for j in range(int(left) // CELL, int(left + width) // CELL + 1):
             total += on[i, j]
+        if total > limit:
+            break
     return total
 
 
@@ -134,8 +136,9 @@ def _place(
                 norm = math.hypot(way[0], way[1])
                 corner_x = x[k] + way[0] / norm * distance + (way[0] - 1.0) * 0.5 * width
                 corner_y = y[k] + way[1] / norm * distance + (way[1] - 1.0) * 0.5 * height
-                covered = _cost(on, corner_x, corner_y, width, height)
-                if covered > _TOO_MUCH and not (insist[k] and lines == 0):
+                limit = 20 * _LABEL if insist[k] else _TOO_MUCH
+                covered = _cost(on, corner_x, corner_y, width, height, limit)
+                if covered > limit:
                     continue
                 towards = (way[0] * ahead[k, 0] + way[1] * ahead[k, 1]) / norm
                 cost = covered + _AGAINST * max(towards, 0.0) + 0.5 * (candidate % len(_DIRECTIONS))

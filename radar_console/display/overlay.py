@@ -1,11 +1,12 @@
 """What moves with the tracks: speed vectors, symbols, labels, truth, lost tracks; one batch of each."""
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
 import pyqtgraph as pg
 from numpy.typing import NDArray
-from PySide6.QtCore import QLineF, QPointF, Qt
+from PySide6.QtCore import QLineF, QPointF, QRectF, Qt
 from PySide6.QtGui import QColor, QFontMetricsF, QPainter, QPen, QPixmap, QStaticText
 
 from radar_console.core.geometry import to_polar
@@ -17,7 +18,7 @@ from radar_console.display.palette import Palette, mix
 from radar_console.display.picture import Picture, name
 from radar_console.display.projection import Projection
 from radar_console.display.quantities import bearing, significant
-from radar_console.display.view import Layer, View
+from radar_console.display.view import Layer, SpeedUnit, View
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -80,6 +81,8 @@ class Overlay:
         self._lines = pg.Qt.internals.PrimitiveArray(QLineF, 4)
         self._texts: dict[tuple[str, bool], QStaticText] = {}
         self._placed: dict[int, int] = {}
+        self._written: dict[int, tuple[tuple[float, int], tuple[str, ...]]] = {}
+        self._written_for: tuple[int, SpeedUnit] | None = None
         self._symbols = QPixmap()
         self._symbols_for: tuple[Palette, float] | None = None
 
@@ -206,35 +209,40 @@ class Overlay:
             titled = titled | (shown.rows["track"] == view.selected)
         kept = np.flatnonzero(titled)
         rows, x, y = shown.rows[kept], shown.x[kept], shown.y[kept]
-        texts = [
-            label_text(row, number, view, detail)
-            for row, number in zip(rows, shown.numbers[kept], strict=True)
-        ]
+        texts = self._write(rows, shown.numbers[kept], view, detail)
         metrics = QFontMetricsF(fonts.font(fonts.SMALL, bold=True))
         advance, line = metrics.horizontalAdvance("0"), metrics.height()
-        sizes = (
-            np.array(
-                [
-                    [[max(map(len, text)) * advance, len(text) * line], [len(text[0]) * advance, line]]
-                    for text in texts
-                ]
-            ).reshape(-1, 2, 2)
-            + 2.0 * _PAD
-        )
+        sizes = _sizes(texts, advance, line)
         way = np.stack([rows["v_east"], -rows["v_north"]], axis=1)
         speed = np.hypot(way[:, 0], way[:, 1])
         way = way / np.maximum(speed, 1e-9)[:, None]
-        previous = np.array([self._placed.get(int(t), labels.HIDDEN) for t in rows["track"]], np.int64)
+        previous = np.array([self._placed.get(t, labels.HIDDEN) for t in rows["track"].tolist()], np.int64)
         insist = (rows["track"] == (-1 if view.selected is None else view.selected)).astype(np.int64)
         place, level, left, top = labels.place(board, x, y, way, sizes, previous, insist)
         self._placed = dict(zip(rows["track"].tolist(), place.tolist(), strict=True))
         visible = np.flatnonzero(place != labels.HIDDEN)
         self.hidden = len(place) - len(visible)
         size = sizes[np.arange(len(place)), level]
+        self._paint_grounds(painter, left[visible], top[visible], size[visible], palette)
         self._paint_leaders(
             painter, x[visible], y[visible], left[visible], top[visible], size[visible], palette
         )
         self._paint_texts(painter, texts, visible, level, left + _PAD, top + _PAD, line, insist, palette)
+
+    def _paint_grounds(
+        self, painter: QPainter, left: Floats, top: Floats, size: Floats, palette: Palette
+    ) -> None:
+        """Dim what lies below the text, so that it can be read over echoes."""
+        if len(left) == 0:
+            return
+        boxes = pg.Qt.internals.PrimitiveArray(QRectF, 4)
+        boxes.resize(len(left))
+        table = boxes.ndarray()
+        table[:, 0], table[:, 1] = np.round(left), np.round(top)
+        table[:, 2:] = np.round(size)
+        painter.setPen(Qt.PenStyle.NoPen)
+        painter.setBrush(qcolor(palette.scope, 0.6))
+        painter.drawRects(*boxes.drawargs())
 
     def _paint_leaders(
         self,
@@ -269,18 +277,34 @@ class Overlay:
         palette: Palette,
     ) -> None:
         """The names, then the lines below them: two passes, since a change of font costs most."""
+        places = np.round(np.stack([left, top], axis=1)).tolist()
         painter.setFont(fonts.font(fonts.SMALL, bold=True))
         for chosen, hue in ((0, palette.text), (1, palette.bright)):
             painter.setPen(qcolor(hue))
-            for k in visible[strong[visible] == chosen]:
-                painter.drawStaticText(QPointF(round(left[k]), round(top[k])), self._text(texts[k][0], True))
+            for k in visible[strong[visible] == chosen].tolist():
+                painter.drawStaticText(QPointF(*places[k]), self._text(texts[k][0], True))
         painter.setFont(fonts.font(fonts.SMALL))
         painter.setPen(qcolor(palette.dim))
-        for k in visible[level[visible] == 0]:
+        for k in visible[level[visible] == 0].tolist():
+            x, y = places[k]
             for number, text in enumerate(texts[k][1:], 1):
-                painter.drawStaticText(
-                    QPointF(round(left[k]), round(top[k] + number * line)), self._text(text, False)
-                )
+                painter.drawStaticText(QPointF(x, round(y + number * line)), self._text(text, False))
+
+    def _write(self, rows: Table, numbers: Integers, view: View, detail: int) -> list[tuple[str, ...]]:
+        """The labels' lines; a label is written anew only when its track has been updated."""
+        state = (detail, view.speed_unit)
+        if state != self._written_for:
+            self._written, self._written_for = {}, state
+        known, self._written = self._written, {}
+        stamps = zip(rows["time"].tolist(), numbers.tolist(), strict=True)
+        for k, (track, stamp) in enumerate(zip(rows["track"].tolist(), stamps, strict=True)):
+            entry = known.get(track)
+            if entry is None or entry[0] != stamp:
+                speed, course = to_polar(rows["v_east"][k], rows["v_north"][k])
+                height = float(rows["up"][k])
+                entry = (stamp, label_text(stamp[1], float(speed), float(course), height, view, detail))
+            self._written[track] = entry
+        return [text for _, text in self._written.values()]
 
     def _text(self, text: str, bold: bool) -> QStaticText:
         """The text, laid out once."""
@@ -305,18 +329,24 @@ class Overlay:
         painter.drawLines(*self._lines.drawargs())
 
 
-def label_text(row: np.void, number: int, view: View, detail: int) -> tuple[str, ...]:
-    """The lines of a label: name; speed; course and flight level."""
-    title = name(int(number))
+def label_text(
+    number: int, speed: float, course: float, height: float, view: View, detail: int
+) -> tuple[str, ...]:
+    """The lines of a label: name; speed, m/s; course, rad, and flight level of a height, m."""
+    title = name(number)
     if detail == 1:
         return (title,)
-    speed, azimuth = to_polar(row["v_east"], row["v_north"])
-    pace = f"{significant(float(speed) / view.speed_unit.metres_per_second)} {view.speed_unit}"
+    pace = f"{significant(speed / view.speed_unit.metres_per_second)} {view.speed_unit}"
     if detail == 2:
         return title, pace
-    course = bearing(float(azimuth))
-    level = "" if np.isnan(row["up"]) else f" FL{max(round(row['up'] / FLIGHT_LEVEL), 0):03d}"
-    return title, pace, course + level
+    level = "" if math.isnan(height) else f" FL{max(round(height / FLIGHT_LEVEL), 0):03d}"
+    return title, pace, bearing(course) + level
+
+
+def _sizes(texts: list[tuple[str, ...]], advance: float, line: float) -> Floats:
+    """(n, 2, 2) width and height, px, of labels in full and of their names alone."""
+    counts = np.array([(max(map(len, text)), len(text), len(text[0]), 1) for text in texts], float)
+    return counts.reshape(-1, 2, 2) * (advance, line) + 2.0 * _PAD
 
 
 def _symbol_tiles(palette: Palette, ratio: float) -> QPixmap:

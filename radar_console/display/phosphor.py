@@ -25,7 +25,9 @@ WEDGE = math.radians(42.0)
 """How far behind the beam the scope is still tinted."""
 
 FAINTEST = 0.5 / (LEVELS - 1)
+_THINNEST, _LEAST = 0.9, 0.1  # px of half a blip's width; part of its light that stays at the least
 _LONGEST = 48.0  # px; a blip is not drawn wider, however far the operator zooms in
+_SQUARE = 3  # px from the middle of a centroid's square to its edge
 _STEPS = 1024  # of the wedge's table
 
 
@@ -90,11 +92,14 @@ class Phosphor:
         east = distance * np.sin(azimuth) + (history.east[rows] - position[0])
         north = distance * np.cos(azimuth) + (history.north[rows] - position[1])
         x, y = projection.to_screen(east, north)
-        half_width = np.clip(0.5 * blip[0] * distance * projection.scale, 0.9, _LONGEST)
+        true_width = 0.5 * blip[0] * distance * projection.scale
+        half_width = np.clip(true_width, _THINNEST, _LONGEST)
         half_depth = min(max(0.5 * blip[1] * projection.scale, 0.75), _LONGEST)
+        # Close to the radar blips crowd into the same pixels: one that is drawn wider shines less.
+        dimmed = glow * np.sqrt(np.clip(true_width / _THINNEST, _LEAST, 1.0))
         kind = history.kind[rows]
         plot, centroid = kind == PLOT_HIT, kind == CENTROID_HIT
-        _light_plots(self._plots, x[plot], y[plot], azimuth[plot], half_width[plot], half_depth, glow[plot])
+        _light_plots(self._plots, x[plot], y[plot], azimuth[plot], half_width[plot], half_depth, dimmed[plot])
         _light_squares(self._centroids, x[centroid], y[centroid], glow[centroid])
 
     def develop(
@@ -193,17 +198,17 @@ def _light_plots(
 
 @njit(cache=True, nogil=True, error_model="numpy", fastmath=True)
 def _light_squares(raster: Raster, x: Floats, y: Floats, glow: Floats) -> None:
-    """A centroid is a hollow square, 7 px wide."""
+    """A centroid is a hollow square."""
     height, width = raster.shape
     for k in range(len(x)):
         if not (-4.0 < x[k] < width + 4.0 and -4.0 < y[k] < height + 4.0):
             continue
         column, row = math.floor(x[k]), math.floor(y[k])
         value = np.float32(glow[k])
-        for dy in range(-3, 4):
-            for dx in range(-3, 4):
+        for dy in range(-_SQUARE, _SQUARE + 1):
+            for dx in range(-_SQUARE, _SQUARE + 1):
                 i, j = row + dy, column + dx
-                on_edge = abs(dx) == 3 or abs(dy) == 3
+                on_edge = abs(dx) == _SQUARE or abs(dy) == _SQUARE
                 if on_edge and 0 <= i < height and 0 <= j < width and value > raster[i, j]:
                     raster[i, j] = value
 

@@ -277,7 +277,7 @@ def name(number: int) -> str:
 
 
 def _brightness(amplitude: NDArray[np.float64]) -> NDArray[np.float64]:
-    """From the detection threshold (about 10 dB over the noise) to strong echoes (40 dB), in 0.4 … 1."""
+    """From the detection threshold (about 10 dB over the noise) to clear echoes (30 dB), in 0.2 … 1."""
     with np.errstate(divide="ignore", invalid="ignore"):
         decibel = 20.0 * np.log10(amplitude)
-    return np.nan_to_num(np.clip(0.4 + 0.6 * (decibel - 10.0) / 30.0, 0.4, 1.0), nan=1.0)
+    return np.nan_to_num(np.clip(0.2 + 0.8 * (decibel - 10.0) / 20.0, 0.2, 1.0), nan=1.0)

@@ -147,6 +147,10 @@ class Ppi(pg.GraphicsView):  # type: ignore[misc]
         """Labels that found no room."""
         return self._overlay.hidden
 
+    def close(self) -> bool:
+        """Close the widget as Qt does; pyqtgraph's own takes the viewport away first, which crashes."""
+        return bool(QWidget.close(self))
+
     def sizeHint(self) -> QSize:
         return QSize(1024, 1024)
 
@@ -427,6 +431,6 @@ def _draw_trails(pixels: Pixels, on: Projection, picture: Picture, length: float
     age = np.where(fresh, (picture.time - points[:, :, 2]) / length, 1.0)
     starts = np.zeros(x.shape, bool)
     starts[:, 0] = True
-    opacity = 0.65 * (1.0 - np.clip(age, 0.0, 1.0)) + 0.08
+    opacity = 0.85 * (1.0 - np.clip(age, 0.0, 1.0)) + 0.1
     hue = mix(palette.scope, palette.track, 0.8)
     strokes.draw(pixels, x.ravel(), y.ravel(), starts.ravel(), packed(hue), opacity.ravel())

@@ -9,7 +9,7 @@ from radar_console.display.view import View
 
 Floats = NDArray[np.float64]
 
-MARGIN = 36.0
+MARGIN = 44.0
 """Between the rim of the scope and the edge of the window, where bearings are written, px."""
 
 
