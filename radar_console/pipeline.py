@@ -8,7 +8,7 @@ oldest waiting sector and counts it with its plots and centroids (a live source 
 import queue
 import threading
 import time
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Generator, Iterable, Iterator
 from dataclasses import dataclass, field
 from enum import StrEnum
 from typing import Protocol
@@ -70,7 +70,7 @@ def threaded(
     depth: int = 64,
     policy: Policy = Policy.BLOCK,
     gauge: Gauge | None = None,
-) -> Iterator[Sector]:
+) -> Generator[Sector]:
     """Run the source and every stage in threads of their own, joined by bounded queues.
 
     Closing the returned iterator stops the threads.

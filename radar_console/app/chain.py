@@ -2,7 +2,7 @@
 
 import time
 from collections import defaultdict
-from collections.abc import Iterable, Iterator
+from collections.abc import Generator, Iterable, Iterator
 from dataclasses import dataclass, field
 
 from radar_console import pipeline
@@ -62,7 +62,7 @@ class Chain:
 
     def __post_init__(self) -> None:
         from radar_console.plots.clustering import Clustering
-        from radar_console.tracker.stage import Tracker
+        from radar_console.tracker import Tracker
 
         settings = self.opened.settings
         self.clustering = Clustering(settings.plots, settings.radar)
@@ -70,7 +70,7 @@ class Chain:
 
     def run(
         self, threads: bool = False, pace: Pace | None = None, policy: Policy = Policy.BLOCK
-    ) -> Iterator[Sector]:
+    ) -> Generator[Sector]:
         """Sectors with their tracks, counted in `tally`."""
         source: Iterable[Sector] = self.opened.source.sectors()
         if pace is not None:
@@ -92,4 +92,6 @@ class Chain:
             done = self.tracker.push(sector)
             self.tally.tracker_s[int(sector.begin // TURN)] += time.perf_counter() - began
             yield done
-        yield from self.tracker.flush()
+        rest = self.tracker.flush()
+        if rest is not None:
+            yield rest

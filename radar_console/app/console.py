@@ -14,9 +14,9 @@ from radar_console.app.opening import Opened
 from radar_console.app.status import StatusLine
 from radar_console.core.errors import RadarConsoleError
 from radar_console.core.messages import Sector
-from radar_console.core.units import KM, NM
-from radar_console.display.console import Options
+from radar_console.core.units import KM
 from radar_console.display.feed import Feed
+from radar_console.display.options import Options
 from radar_console.pipeline import Pace, Policy
 
 log = logging.getLogger(__name__)
@@ -32,7 +32,6 @@ def display_missing() -> bool:
 def options_of(opened: Opened, user_map: Path | None) -> Options:
     """How the console starts on this source."""
     display, radar = opened.settings.display, opened.source.radar
-    unit = NM if display.range_unit == "NM" else KM
     tracker = opened.settings.tracker
     subtitle = f"{opened.kind} · seed {opened.seed}" if opened.kind == "simulation" else opened.kind
     return Options(

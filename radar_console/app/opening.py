@@ -9,7 +9,7 @@ import numpy as np
 
 from radar_console import pipeline, scenario
 from radar_console.core.errors import InputError
-from radar_console.core.messages import Radar, Table
+from radar_console.core.messages import Table
 from radar_console.scenario import Configuration
 
 DEMO = "twenty-five"
@@ -33,6 +33,7 @@ class Opened:
     ----------
     title : for the screen
     kind : "simulation", "recording" or "plot table"
+    epoch : date and time of data time 0; None if nobody knows
     truth : where the targets are at a time, s; None if nobody knows
     seed : of the tracker
     """
@@ -84,12 +85,12 @@ def open_source(
     if suffix in ASTERIX_SUFFIXES:
         from radar_console.asterix.source import AsterixRecording
 
-        recording = AsterixRecording(file, sac_sic, **_radar_overrides(settings, given))
+        recording = AsterixRecording(file, sac_sic, settings.radar.message, given)
         return Opened(recording, settings, file.name, "recording", None, seed or 0)
     if suffix == ".csv":
         from radar_console.recording.table import PlotTable
 
-        table = PlotTable(file, **_radar_overrides(settings, given))
+        table = PlotTable(file, settings.radar.message, given)
         return Opened(table, settings, file.name, "plot table", None, seed or 0)
     raise InputError(file, "", f"unknown kind of file; {EXPECTED}")
 
@@ -118,8 +119,3 @@ def _simulation(file: Path, config: Path | None, seed: int | None) -> Opened:
         radar=settings.radar, plots=settings.plots, tracker=settings.tracker, display=settings.display
     )
     return Opened(simulator, own, settings.title, "simulation", simulator.truth, seed)
-
-
-def _radar_overrides(settings: Configuration, given: frozenset[str]) -> dict[str, Radar | frozenset[str]]:
-    """What the configuration says of the radar, and which of its keys were really given."""
-    return {"radar": settings.radar.message, "given": frozenset(k for k in given if k.startswith("radar."))}

@@ -63,7 +63,7 @@ class Simulator:
         if problems:
             raise ScenarioError(file, problems)
 
-        self._clutter, self._antenna = scenario.clutter, antenna
+        self._scenario, self._clutter, self._antenna = scenario, scenario.clutter, antenna
         cells = cell_count(settings.max_range_km, settings.cell_m)
         self._raw = settings.returns == "raw"
         if self._raw:
@@ -91,6 +91,25 @@ class Simulator:
     def truth(self, t: float) -> Table:
         """The targets alive at `t`, s: TRUTH, from the radar's site."""
         return self._scene.targets.truth(t, self._scene.radar.height_m)
+
+    def facts(self) -> list[tuple[str, str]]:
+        """Label and value, for the user."""
+        scenario, radar = self._scenario, self._scenario.radar
+        place = "nowhere in particular"
+        if self.radar.site is not None:
+            place = f"{radar.latitude_deg:.4f}°, {radar.longitude_deg:.4f}°, {radar.height_m:g} m"
+        return [
+            ("format", "scenario"),
+            ("title", scenario.title),
+            ("about", scenario.description),
+            ("duration", f"{self.duration:,.1f} s"),
+            ("radar", f"{radar.name}, {place}"),
+            ("rotation", f"{radar.rotation_s:g} s, {60.0 / radar.rotation_s:.3g} rpm"),
+            ("range", f"{radar.max_range_km:g} km"),
+            ("returns", radar.returns),
+            ("targets", f"{len(self.names):,}"),
+            ("seed", str(scenario.seed)),
+        ]
 
     def _turns(self) -> Iterator[Table]:
         receiver, echoes, chance = deepcopy(self._generators)
