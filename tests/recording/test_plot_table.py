@@ -250,7 +250,7 @@ def test_a_plot_table_holds_one_kind(tmp_path):
 
 def test_tracks_have_the_columns_of_the_contract(tmp_path):
     tracks = blank(TRACK, 2)
-    tracks["track"], tracks["time"] = [3, 12], [61.03, 61.12345]
+    tracks["track"], tracks["time"] = [3, 12], [61.03, 61.12346]
     tracks["status"] = [TrackStatus.CONFIRMED, TrackStatus.COASTING]
     tracks["east"], tracks["north"], tracks["up"] = [300.0, -1000.0], [400.0, 0.0], [np.nan, 1500.0]
     tracks["v_east"], tracks["v_north"] = [-0.0001, 20.0], [5.0, 0.0]
