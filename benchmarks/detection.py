@@ -117,6 +117,22 @@ def passages(scenario: Scenario, seed: int) -> Passages:
     )
 
 
+def at_range(range_km: float, scans: int, seed: int) -> Passages:
+    """Passages over still targets that are placed anew every fifth scan."""
+    parts = []
+    for part in range(-(-scans // 5)):
+        rng = np.random.default_rng((seed, part))
+        parts.append(passages(still_targets(range_km, 5, rng), seed * 1000 + part))
+    return Passages(
+        count=sum(p.count for p in parts),
+        found=np.concatenate([p.found for p in parts]),
+        error_range=np.concatenate([p.error_range for p in parts]),
+        error_azimuth=np.concatenate([p.error_azimuth for p in parts]),
+        others=sum(p.others for p in parts),
+        doubles=sum(p.doubles for p in parts),
+    )
+
+
 def detection_probability(radar: RadarSettings, range_km: float, hits: int) -> float:
     """At least `hits` of the pulses and cells that a Swerling I target fills, in theory.
 
@@ -202,6 +218,12 @@ def resolved(separation: Separation, count: int, seed: int) -> float:
     return both / (turns * each)
 
 
+def _parts_within(z: Array) -> str:
+    """Parts of |z| (2, n) below 2 and above 4, in range and in azimuth."""
+    inside, outside = np.mean(z < 2.0, axis=1), np.mean(z > 4.0, axis=1)
+    return f"{inside[0]:.3f} {inside[1]:.3f}  {outside[0]:.4f} {outside[1]:.4f}"
+
+
 @app.command(epilog="Example:  python benchmarks/detection.py --scans 60 --range-km 250")
 def main(
     scans: Annotated[int, typer.Option(help="Scans of 40 targets at each range.")] = 60,
@@ -211,23 +233,31 @@ def main(
 ) -> None:
     """Print the tables of docs/detection.md."""
     hits = Scenario(title="", duration_s=1.0).plots.min_hits
-    print("range  passages   P_D  theory   hits 5/50/95   σ_r m   σ_az °  bias °  |z|<2 r az    |z|>4 r az")
+    print("   km  passages    P_D theory   hits 5/50/95   σ_r m   σ_az °  bias °  |z|<2 r az   |z|>4 r az")
+    every = []
     for r in range_km or RANGES_KM:
-        run = passages(still_targets(r, scans, np.random.default_rng(seed)), seed)
+        run = at_range(r, scans, seed)
         theory = detection_probability(RadarSettings(), r, hits)
         number = "/".join(f"{q:.0f}" for q in np.quantile(run.found["hits"], (0.05, 0.5, 0.95)))
-        z = np.abs(run.z)
+        every.append(run.z)
         print(
-            f"{r:5.0f} {run.count:9d} {run.p_d:6.3f} {theory:6.3f} {number:>13} "
-            f"{run.error_range.std():8.1f} {run.error_azimuth.std() / DEG:8.4f} "
-            f"{run.error_azimuth.mean() / DEG:7.4f}  {np.mean(z[0] < 2):.3f} {np.mean(z[1] < 2):.3f}  "
-            f"{np.mean(z[0] > 4):.4f} {np.mean(z[1] > 4):.4f}  extended {run.flagged(CentroidFlag.EXTENDED)}"
-            f" split {run.flagged(CentroidFlag.SPLIT)} doubles {run.doubles}"
+            f"{r:5.0f} {run.count:9d} {run.p_d:6.3f} {theory:6.3f} {number:>14} "
+            f"{run.error_range.std():7.1f} {run.error_azimuth.std() / DEG:8.4f} "
+            f"{run.error_azimuth.mean() / DEG:7.4f}  {_parts_within(np.abs(run.z))}  "
+            f"extended {run.flagged(CentroidFlag.EXTENDED)}, split {run.flagged(CentroidFlag.SPLIT)}"
         )
-    started = time.perf_counter()
-    empty = scene((), scans)
-    print(f"\nfalse centroids a scan: {len(centroids_of(empty, seed)) / scans:.1f}", end="")
-    print(f"   ({(time.perf_counter() - started) / scans * 1e3:.0f} ms a scan, simulation and clustering)")
+    z = np.abs(np.concatenate(every, axis=1))
+    print(f"{'all':>5} {z.shape[1]:9d} found {'':51}{_parts_within(z)}")
+
+    noise = scene((), scans)
+    sectors = list(Simulator(noise, np.random.default_rng(seed)).sectors())
+    stage = Clustering(noise.plots, noise.radar)
+    started = time.process_time()
+    for _ in stage(sectors):
+        pass
+    spent = time.process_time() - started
+    print(f"\nfalse centroids a scan: {stage.centroids / scans:.1f} of {stage.plots / scans:.0f} plots")
+    print(f"clustering: {spent / scans * 1e3:.1f} ms a scan, {spent / len(sectors) * 1e3:.2f} ms a sector")
     print("\nbeams cells  both found")
     for beams, cells in ((1.0, 0.0), (1.25, 0.0), (1.5, 0.0), (0.0, 1.5), (0.0, 2.0), (0.0, 2.5)):
         print(f"{beams:5.2f} {cells:5.1f} {resolved(Separation(beams, cells), pairs, seed):11.3f}")

@@ -9,6 +9,7 @@ import pytest
 from benchmarks.detection import (
     Passages,
     Separation,
+    at_range,
     centroids_of,
     detection_probability,
     passages,
@@ -29,7 +30,7 @@ def four_errors(p: float, n: int) -> float:
 @pytest.fixture(scope="module")
 def far() -> Passages:
     """400 passages at 250 km."""
-    return passages(still_targets(250.0, 10, np.random.default_rng(7)), 7)
+    return at_range(250.0, 10, 7)
 
 
 def test_theory_by_hand() -> None:
@@ -61,6 +62,25 @@ def test_claims_are_kept(far: Passages) -> None:
         assert np.mean(z > 4.0) < 0.002 + four_errors(0.002, len(z))
 
 
+def test_claims_are_kept_by_a_radar_of_another_scale() -> None:
+    """A harbour radar from 2 to 6 km: cells of 10 m, and 14 pulses in a beam of 1°."""
+    harbour = {
+        "rotation_s": 2.5,
+        "prf_hz": 2000.0,
+        "beam_width_deg": 1.0,
+        "cell_m": 10.0,
+        "max_range_km": 7.0,
+        "wavelength_m": 0.03,
+        "snr_range_km": 5.0,
+        "stc_range_km": 1.0,
+        "p_fa": 1e-3,
+    }
+    near = passages(still_targets(4.0, 5, np.random.default_rng(9), **harbour), 9)
+    assert near.error_range.std() < 3.0  # the default radar's is 20 m
+    for z in np.abs(near.z):
+        assert np.mean(z < 2.0) > 0.94 - four_errors(0.94, len(z))
+
+
 def test_false_centroids() -> None:
     """Four scans of noise: Poisson with a mean of 35 to 50 a scan."""
     found = len(centroids_of(scene((), 4), 3))
@@ -68,7 +88,7 @@ def test_false_centroids() -> None:
 
 
 def test_strong_near_targets_are_neither_land_nor_split() -> None:
-    near = passages(still_targets(50.0, 10, np.random.default_rng(8)), 8)
+    near = at_range(50.0, 10, 8)
     assert near.p_d == 1.0
     assert near.flagged(CentroidFlag.EXTENDED | CentroidFlag.SPLIT) == 0
 
