@@ -1,5 +1,6 @@
 """The chain behind a source: clustering, tracker, and what is measured on the way."""
 
+import math
 import time
 from collections import defaultdict
 from collections.abc import Generator, Iterable, Iterator
@@ -90,7 +91,9 @@ class Chain:
         for sector in sectors:
             began = time.perf_counter()
             done = self.tracker.push(sector)
-            self.tally.tracker_s[int(sector.begin // TURN)] += time.perf_counter() - began
+            # A sector that ends at north, or one without extent there, belongs to the turn before.
+            turn = math.ceil(sector.end / TURN - 1e-9) - 1
+            self.tally.tracker_s[turn] += time.perf_counter() - began
             yield done
         rest = self.tracker.flush()
         if rest is not None:
