@@ -5,7 +5,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
-from PySide6.QtCore import QPointF, QRectF, Qt
+from PySide6.QtCore import QPointF, Qt
 from PySide6.QtGui import QColor, QFontMetricsF, QPainter
 
 from radar_console.core.units import DEG
@@ -16,6 +16,9 @@ from radar_console.display.strokes import Pixels
 from radar_console.display.view import View
 
 Floats = NDArray[np.float64]
+Box = tuple[float, float, float, float]
+"""Left, top, width, height, px."""
+Boxes = list[Box]
 Map = Mapping[str, Sequence[NDArray[np.floating]]]
 
 MAP_STYLES: dict[str, tuple[str, strokes.Dash]] = {
@@ -25,9 +28,13 @@ MAP_STYLES: dict[str, tuple[str, strokes.Dash]] = {
 }
 """Name in the palette and dash of each layer of a map; layers of other names look like the user's."""
 
+TITLE: Box = (0.0, 0.0, 280.0, 56.0)
+"""Kept free for the title, px."""
+
 _MOST_RINGS = 100
 _TICK, _LONG_TICK = 5.0, 9.0  # px
 _BEARING_OUT = 25.0  # px from the rim to the middle of a bearing's figures
+_GAP = 3.0  # px, at least, between two texts
 _INSET = 18.0  # px from the edge of the screen, where a spoke leaves it
 
 
@@ -79,13 +86,16 @@ def draw_disc(painter: QPainter, on: Projection, view: View, palette: Palette) -
     painter.drawEllipse(QPointF(on.x0, on.y0), rim, rim)
 
 
-def draw_grid(pixels: Pixels, on: Projection, view: View, palette: Palette, coverage: float) -> None:
+def draw_grid(
+    pixels: Pixels, on: Projection, view: View, palette: Palette, coverage: float, ratio: float
+) -> None:
     """Rings and spokes about the radar, the rim with its ticks.
 
     Parameters
     ----------
     on : projection to the pixels of the device
     coverage : instrumented range, m; rings beyond the rim go as far
+    ratio : pixels of the device in one of the widget
     """
     for radius in ring_radii(on, view, coverage):
         is_rim = abs(radius - view.range_m) < 1e-6 * radius
@@ -95,41 +105,46 @@ def draw_grid(pixels: Pixels, on: Projection, view: View, palette: Palette, cove
     rim = view.range_m * on.scale
     first = min(view.ring_spacing_m, view.range_m) * on.scale
     end = max(view.range_m, min(on.reach, coverage)) * on.scale
-    spokes = np.arange(0, 360, 30) * DEG
+    spokes = np.radians(np.arange(0.0, 360.0, 30.0))
     _rays(pixels, on, spokes, first, end, palette.ring)
-    ticks = np.arange(0, 360, 10) * DEG
-    _rays(pixels, on, ticks, rim, rim + _TICK, mix(palette.ring, palette.ring_text, 0.5))
-    _rays(pixels, on, spokes, rim, rim + _LONG_TICK, palette.ring_text)
+    ticks = np.radians(np.arange(0.0, 360.0, 10.0))
+    _rays(pixels, on, ticks, rim, rim + _TICK * ratio, mix(palette.ring, palette.ring_text, 0.5))
+    _rays(pixels, on, spokes, rim, rim + _LONG_TICK * ratio, palette.ring_text)
 
 
-def draw_figures(
-    painter: QPainter, on: Projection, view: View, palette: Palette, coverage: float
-) -> list[tuple[float, float, float, float]]:
-    """Ranges along a spoke and bearings outside the rim; returns their boxes, px."""
-    painter.setFont(fonts.font(fonts.SMALL))
-    metrics = QFontMetricsF(painter.font())
+def draw_figures(painter: QPainter, on: Projection, view: View, palette: Palette, coverage: float) -> Boxes:
+    """Bearings outside the rim and ranges along a spoke; returns their boxes, px."""
+    boxes: Boxes = []
     painter.setPen(qcolor(palette.ring_text))
-    boxes = []
-    spoke, ranges = _readable_spoke(on, view, coverage)
-    for radius in ranges:
-        text = f"{round(radius / view.range_unit.metres, 6):g} {view.range_unit}"
-        x, y = _at(on, spoke, radius * on.scale)
-        box = QRectF(x + 5.0, y + 3.0, metrics.horizontalAdvance(text), metrics.height())
-        painter.drawText(QPointF(round(box.left()), round(box.top() + metrics.ascent())), text)
-        boxes.append((box.left(), box.top(), box.width(), box.height()))
     painter.setFont(fonts.font(fonts.LARGE))
     metrics = QFontMetricsF(painter.font())
-    rim = view.range_m * on.scale
     for degrees in range(0, 360, 30):
-        place = _bearing_place(on, degrees * DEG, rim + _BEARING_OUT)
+        place = _bearing_place(on, degrees * DEG, view.range_m * on.scale + _BEARING_OUT)
         if place is None:
             continue
         text = f"{degrees:03d}"
         width, height = metrics.horizontalAdvance(text), metrics.capHeight()
-        left, base = place[0] - 0.5 * width, place[1] + 0.5 * height
-        painter.drawText(QPointF(round(left), round(base)), text)
-        boxes.append((left, base - height, width, height))
+        box = (place[0] - 0.5 * width, place[1] - 0.5 * height, width, height)
+        if not _touches(box, TITLE):
+            painter.drawText(QPointF(round(box[0]), round(box[1] + height)), text)
+            boxes.append(box)
+    painter.setFont(fonts.font(fonts.SMALL))
+    metrics = QFontMetricsF(painter.font())
+    spoke, ranges = _readable_spoke(on, view, coverage)
+    for radius in ranges:
+        text = f"{round(radius / view.range_unit.metres, 6):g} {view.range_unit}"
+        x, y = _at(on, spoke, radius * on.scale)
+        box = (float(x) + 5.0, float(y) + 3.0, metrics.horizontalAdvance(text), metrics.height())
+        if not any(_touches(box, other) for other in (*boxes, TITLE)):
+            painter.drawText(QPointF(round(box[0]), round(box[1] + metrics.ascent())), text)
+            boxes.append(box)
     return boxes
+
+
+def _touches(one: Box, other: Box) -> bool:
+    """Two boxes overlap, or nearly."""
+    near = all(one[k] < other[k] + other[k + 2] + _GAP for k in (0, 1))
+    return near and all(other[k] < one[k] + one[k + 2] + _GAP for k in (0, 1))
 
 
 def draw_title(painter: QPainter, palette: Palette, title: str, subtitle: str) -> None:
@@ -164,15 +179,15 @@ def _at(on: Projection, azimuth: Floats | float, radius: float) -> tuple[Floats,
 
 
 def _readable_spoke(on: Projection, view: View, coverage: float) -> tuple[float, Floats]:
-    """The spoke on which most ring figures are on the screen, north if it ties; and their radii, m."""
+    """The spoke on which clearly most ring figures are on the screen, else north; and their radii, m."""
     radii = ring_radii(on, view, coverage)
     radii = radii[np.abs(radii / view.ring_spacing_m - np.round(radii / view.ring_spacing_m)) < 1e-6]
-    best, seen = 0.0, radii[:0]
+    best, seen = 0.0, radii[:0]  # north comes first, and is left only for a much better one
     for degrees in (0, 330, 30, 300, 60, 270, 90, 240, 120, 210, 150, 180):
         x, y = _at(on, degrees * DEG, 1.0)
         x, y = on.x0 + (x - on.x0) * radii * on.scale, on.y0 + (y - on.y0) * radii * on.scale
         inside = (x > 4.0) & (x < on.width - 70.0) & (y > 4.0) & (y < on.height - 24.0)
-        if inside.sum() > len(seen):
+        if inside.sum() > len(seen) * (1.0 if best else 1.6):
             best, seen = degrees * DEG, radii[inside]
     return best, seen
 

@@ -72,7 +72,7 @@ def place(
     level : (n,) 0 in full, 1 the name alone
     left, top : (n,) corners of the labels, px
     """
-    return _place(on, x, y, ahead, sizes, previous, insist)  # type: ignore[no-any-return]
+    return _place(on, x, y, ahead, sizes, previous, insist)
 
 
 @njit(cache=True, nogil=True)

@@ -24,8 +24,11 @@ Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
 Boxes = list[tuple[float, float, float, float]]
 
-SYMBOL = 6.5
-"""Radius of a track's symbol, px."""
+SYMBOL, CROWDED_SYMBOL = 6.5, 5.0
+"""Radius of a track's symbol, px; and in a crowd."""
+
+CROWD = 250
+"""So many tracks on the screen are a crowd."""
 
 _TILE = 20  # px, of a symbol's pixmap
 _BRACKET = 12.0  # px, from the symbol's middle to the bracket
@@ -84,7 +87,8 @@ class Overlay:
         self._written: dict[int, tuple[tuple[float, int], tuple[str, ...]]] = {}
         self._written_for: tuple[int, SpeedUnit] | None = None
         self._symbols = QPixmap()
-        self._symbols_for: tuple[Palette, float] | None = None
+        self._symbols_for: tuple[Palette, float, float] | None = None
+        self._radius = SYMBOL
 
     def paint(
         self,
@@ -107,6 +111,7 @@ class Overlay:
         if not view.shows(Layer.TRACKS):
             return
         shown = Shown.of(picture, view, on)
+        self._radius = SYMBOL if len(shown.x) <= CROWD else CROWDED_SYMBOL
         self._paint_lost(painter, on, picture, palette)
         if view.shows(Layer.VECTORS):
             self._paint_vectors(painter, shown, palette)
@@ -114,6 +119,7 @@ class Overlay:
         self._paint_bracket(painter, shown, view, palette)
         if view.shows(Layer.LABELS):
             self._paint_labels(painter, on, view, shown, palette, occupied, detail)
+            self._paint_hidden(painter, on, palette)
 
     def _paint_truth(self, painter: QPainter, on: Projection, picture: Picture, palette: Palette) -> None:
         truth = picture.truth
@@ -144,8 +150,8 @@ class Overlay:
             (TrackStatus.CONFIRMED, palette.track, Qt.PenStyle.SolidLine),
             (TrackStatus.COASTING, palette.coasting, Qt.PenStyle.DashLine),
         ):
-            kept = (status == state) & (length > SYMBOL)
-            part = SYMBOL / length[kept]
+            kept = (status == state) & (length > self._radius)
+            part = self._radius / length[kept]
             painter.setPen(QPen(qcolor(hue, 0.9), 1.3, style))
             self._draw_lines(
                 painter,
@@ -158,8 +164,9 @@ class Overlay:
     def _paint_symbols(self, painter: QPainter, shown: Shown, palette: Palette) -> None:
         """One pixmap holds the symbol of each status side by side."""
         ratio = painter.device().devicePixelRatioF()
-        if self._symbols_for != (palette, ratio):
-            self._symbols, self._symbols_for = _symbol_tiles(palette, ratio), (palette, ratio)
+        state = (palette, ratio, self._radius)
+        if self._symbols_for != state:
+            self._symbols, self._symbols_for = _symbol_tiles(*state), state
         count = len(shown.x)
         if count == 0:
             return
@@ -173,7 +180,8 @@ class Overlay:
         table[:, 4:6] = _TILE * ratio
         table[:, 6:8] = 1.0 / ratio
         table[:, 8:] = (0.0, 1.0)
-        painter.drawPixmapFragments(*fragments.drawargs(), self._symbols)
+        first, amount = fragments.drawargs()
+        painter.drawPixmapFragments(first, amount, self._symbols)
 
     def _paint_bracket(self, painter: QPainter, shown: Shown, view: View, palette: Palette) -> None:
         """Four corners about the selected track."""
@@ -229,6 +237,15 @@ class Overlay:
         )
         self._paint_texts(painter, texts, visible, level, left + _PAD, top + _PAD, line, insist, palette)
 
+    def _paint_hidden(self, painter: QPainter, on: Projection, palette: Palette) -> None:
+        """Bottom right: what density has taken away."""
+        if self.hidden:
+            text = f"{self.hidden} labels hidden" if self.hidden > 1 else "1 label hidden"
+            painter.setFont(fonts.font(fonts.SMALL))
+            painter.setPen(qcolor(palette.dim))
+            box = QRectF(0.0, 0.0, on.width - 20.0, on.height - 16.0)
+            painter.drawText(box, Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignBottom, text)
+
     def _paint_grounds(
         self, painter: QPainter, left: Floats, top: Floats, size: Floats, palette: Palette
     ) -> None:
@@ -241,7 +258,7 @@ class Overlay:
         table[:, 0], table[:, 1] = np.round(left), np.round(top)
         table[:, 2:] = np.round(size)
         painter.setPen(Qt.PenStyle.NoPen)
-        painter.setBrush(qcolor(palette.scope, 0.6))
+        painter.setBrush(qcolor(palette.scope, 0.45))
         painter.drawRects(*boxes.drawargs())
 
     def _paint_leaders(
@@ -259,8 +276,8 @@ class Overlay:
         end_y = np.clip(y, top, top + size[:, 1])
         dx, dy = end_x - x, end_y - y
         length = np.maximum(np.hypot(dx, dy), 1e-9)
-        long = length > SYMBOL + 2.0
-        part = SYMBOL / length
+        long = length > self._radius + 2.0
+        part = self._radius / length
         painter.setPen(QPen(qcolor(mix(palette.scope, palette.track, 0.5)), 1.0))
         self._draw_lines(painter, (x + dx * part)[long], (y + dy * part)[long], end_x[long], end_y[long])
 
@@ -349,7 +366,7 @@ def _sizes(texts: list[tuple[str, ...]], advance: float, line: float) -> Floats:
     return counts.reshape(-1, 2, 2) * (advance, line) + 2.0 * _PAD
 
 
-def _symbol_tiles(palette: Palette, ratio: float) -> QPixmap:
+def _symbol_tiles(palette: Palette, ratio: float, radius: float) -> QPixmap:
     """Symbols by status, side by side: tentative small and dotted, confirmed full, coasting dashed."""
     tiles = QPixmap(round(_TILE * 4 * ratio), round(_TILE * ratio))
     tiles.fill(QColor(0, 0, 0, 0))
@@ -359,12 +376,13 @@ def _symbol_tiles(palette: Palette, ratio: float) -> QPixmap:
     middle = 0.5 * _TILE
     dashes = QPen(qcolor(palette.coasting), 1.6)
     dashes.setDashPattern([2.2, 1.9])
-    for status, pen, radius in (
-        (TrackStatus.TENTATIVE, QPen(qcolor(palette.tentative), 1.2), 4.0),
-        (TrackStatus.CONFIRMED, QPen(qcolor(palette.track), 1.6), SYMBOL),
-        (TrackStatus.COASTING, dashes, SYMBOL),
+    for status, pen, part in (
+        (TrackStatus.TENTATIVE, QPen(qcolor(palette.tentative), 1.2), 0.62),
+        (TrackStatus.CONFIRMED, QPen(qcolor(palette.track), 1.6), 1.0),
+        (TrackStatus.COASTING, dashes, 1.0),
     ):
         painter.setPen(pen)
-        painter.drawEllipse(QPointF(_TILE * int(status) + middle + 0.5, middle + 0.5), radius, radius)
+        at = QPointF(_TILE * int(status) + middle + 0.5, middle + 0.5)
+        painter.drawEllipse(at, radius * part, radius * part)
     painter.end()
     return tiles

@@ -5,6 +5,7 @@ the right, y down; (x0, y0) is the radar.
 """
 
 import math
+from typing import Any
 
 import numpy as np
 from numba import njit
@@ -78,6 +79,7 @@ class Phosphor:
         glow: Floats,
         position: tuple[float, float, float],
         blip: tuple[float, float],
+        ratio: float = 1.0,
     ) -> None:
         """Light hits.
 
@@ -87,20 +89,21 @@ class Phosphor:
         glow : (n,) how bright each is, 0 … 1
         position : where the radar is now, m
         blip : how wide a plot is in azimuth, rad, and how deep in range, m
+        ratio : pixels of the device in one of the widget
         """
         azimuth, distance = history.azimuth[rows], history.range[rows]
         east = distance * np.sin(azimuth) + (history.east[rows] - position[0])
         north = distance * np.cos(azimuth) + (history.north[rows] - position[1])
         x, y = projection.to_screen(east, north)
         true_width = 0.5 * blip[0] * distance * projection.scale
-        half_width = np.clip(true_width, _THINNEST, _LONGEST)
-        half_depth = min(max(0.5 * blip[1] * projection.scale, 0.75), _LONGEST)
+        half_width = np.clip(true_width, _THINNEST * ratio, _LONGEST * ratio)
+        half_depth = min(max(0.5 * blip[1] * projection.scale, 0.75 * ratio), _LONGEST * ratio)
         # Close to the radar blips crowd into the same pixels: one that is drawn wider shines less.
-        dimmed = glow * np.sqrt(np.clip(true_width / _THINNEST, _LEAST, 1.0))
+        dimmed = glow * np.sqrt(np.clip(true_width / (_THINNEST * ratio), _LEAST, 1.0))
         kind = history.kind[rows]
         plot, centroid = kind == PLOT_HIT, kind == CENTROID_HIT
         _light_plots(self._plots, x[plot], y[plot], azimuth[plot], half_width[plot], half_depth, dimmed[plot])
-        _light_squares(self._centroids, x[centroid], y[centroid], glow[centroid])
+        _light_squares(self._centroids, x[centroid], y[centroid], glow[centroid], round(_SQUARE * ratio))
 
     def develop(
         self, under: Pixels, decay: float, projection: Projection, beam: float, radius: float, tint: bool
@@ -197,18 +200,18 @@ def _light_plots(
 
 
 @njit(cache=True, nogil=True, error_model="numpy", fastmath=True)
-def _light_squares(raster: Raster, x: Floats, y: Floats, glow: Floats) -> None:
+def _light_squares(raster: Raster, x: Floats, y: Floats, glow: Floats, half: int) -> None:
     """A centroid is a hollow square."""
     height, width = raster.shape
     for k in range(len(x)):
-        if not (-4.0 < x[k] < width + 4.0 and -4.0 < y[k] < height + 4.0):
+        if not (-half - 1 < x[k] < width + half + 1 and -half - 1 < y[k] < height + half + 1):
             continue
         column, row = math.floor(x[k]), math.floor(y[k])
         value = np.float32(glow[k])
-        for dy in range(-_SQUARE, _SQUARE + 1):
-            for dx in range(-_SQUARE, _SQUARE + 1):
+        for dy in range(-half, half + 1):
+            for dx in range(-half, half + 1):
                 i, j = row + dy, column + dx
-                on_edge = abs(dx) == _SQUARE or abs(dy) == _SQUARE
+                on_edge = abs(dx) == half or abs(dy) == half
                 if on_edge and 0 <= i < height and 0 <= j < width and value > raster[i, j]:
                     raster[i, j] = value
 
@@ -278,14 +281,14 @@ def _develop(
         half_chord = math.sqrt(max(radius * radius - dy * dy, 0.0))
         for column in range(width):
             dx = column + 0.5 - x0
-            colour = np.int64(under[row, column])
+            colour: Any = np.int64(under[row, column])
             behind = beam_y * dx - beam_x * dy
             along = beam_x * dx + beam_y * dy
             if 0.0 <= behind < along * steepest and -half_chord < dx < half_chord:
                 opacity = tint[int(behind / along * per_step)]
                 colour = _tinted(colour, sweep, opacity, _BAYER[dither_row + (column & 3)])
             # Without a test for darkness: glow is scattered, and a branch missed costs more.
-            shade = np.int64(ramp[int(plots[row, column] * top)])
+            shade: Any = np.int64(ramp[int(plots[row, column] * top)])
             colour = _blend(colour, shade, shade >> 24)
             level = int(centroids[row, column] * top)
             if level > 0:

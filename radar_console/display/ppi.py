@@ -20,6 +20,7 @@ from radar_console.core.units import TURN
 from radar_console.display import strokes
 from radar_console.display.furniture import (
     MAP_STYLES,
+    TITLE,
     Lines,
     Map,
     draw_disc,
@@ -51,7 +52,7 @@ _WHEEL_STEP = 120  # Qt's angle of one notch
 _NO_COVERAGE = 1e9  # m; before the radar is known the scope has no edge
 
 
-class Ppi(pg.GraphicsView):  # type: ignore[misc]
+class Ppi(pg.GraphicsView):
     """The scope.
 
     Attributes
@@ -87,6 +88,7 @@ class Ppi(pg.GraphicsView):  # type: ignore[misc]
         self._lit = 0
         self._overlay_age = math.inf
         self._drawn: tuple[Any, ...] = ()
+        self._phosphor_drawn: tuple[Any, ...] = ()
         self._pressed: QPointF | None = None
         self._dragging = False
         self.setViewportUpdateMode(pg.GraphicsView.ViewportUpdateMode.NoViewportUpdate)
@@ -214,12 +216,12 @@ class Ppi(pg.GraphicsView):  # type: ignore[misc]
             for name, lines in self._map.items():
                 hue, dash = MAP_STYLES.get(name, MAP_STYLES["user"])
                 lines.draw(self._base_pixels, device, self.picture.position[:2], getattr(palette, hue), dash)
-        self._boxes = []
+        self._boxes = [TITLE]
         painter = QPainter(self._base)
         painter.setRenderHint(QPainter.RenderHint.TextAntialiasing)
         if view.shows(Layer.GRID):
-            draw_grid(self._base_pixels, device, view, palette, self._coverage)
-            self._boxes = draw_figures(painter, on, view, palette, self._coverage)
+            draw_grid(self._base_pixels, device, view, palette, self._coverage, ratio)
+            self._boxes += draw_figures(painter, on, view, palette, self._coverage)
         draw_title(painter, palette, *self._title)
         painter.end()
 
@@ -278,9 +280,9 @@ class Ppi(pg.GraphicsView):  # type: ignore[misc]
             return
         shown = np.array([self.view.shows(Layer.PLOTS), self.view.shows(Layer.CENTROIDS)])
         kept = shown[self.picture.history.kind[rows]]
-        blip = (radar.beam_width / _BEAM_PARTS, BLIP_DEPTH)
+        blip, ratio = (radar.beam_width / _BEAM_PARTS, BLIP_DEPTH), self._base.devicePixelRatioF()
         self._phosphor.light(
-            self._device, self.picture.history, rows[kept], glow[kept], self.picture.position, blip
+            self._device, self.picture.history, rows[kept], glow[kept], self.picture.position, blip, ratio
         )
 
     def _develop(self, wall: float) -> None:
@@ -394,7 +396,7 @@ class Ppi(pg.GraphicsView):  # type: ignore[misc]
         return int(tracks["track"][nearest]) if distance[nearest] <= _PICK else None
 
 
-class _Scope(pg.GraphicsObject):  # type: ignore[misc]
+class _Scope(pg.GraphicsObject):
     """The one item of the scene: it fills the view."""
 
     def __init__(self, ppi: Ppi) -> None:
@@ -431,6 +433,6 @@ def _draw_trails(pixels: Pixels, on: Projection, picture: Picture, length: float
     age = np.where(fresh, (picture.time - points[:, :, 2]) / length, 1.0)
     starts = np.zeros(x.shape, bool)
     starts[:, 0] = True
-    opacity = 0.85 * (1.0 - np.clip(age, 0.0, 1.0)) + 0.1
+    opacity = 0.9 * np.sqrt(1.0 - np.clip(age, 0.0, 1.0)) + 0.1
     hue = mix(palette.scope, palette.track, 0.8)
     strokes.draw(pixels, x.ravel(), y.ravel(), starts.ravel(), packed(hue), opacity.ravel())
