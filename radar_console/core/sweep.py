@@ -53,8 +53,9 @@ def cut(
     angle: Array,
     active: Array,
     positions: Callable[[Array], Array] | None = None,
+    sectors: int = SECTORS,
 ) -> Iterator[Sector]:
-    """Yield a sector for every 64th of a turn, with its rows of the table, in the order of angle.
+    """Yield so many sectors a turn, each with its rows of the table, in the order of angle.
 
     Where nothing happens for more than ten turns the recording has a hole: no sector is sent,
     because the beam was not watched.
@@ -67,12 +68,13 @@ def cut(
     angle : (rows,) unwrapped angle of each row, rad
     active : (n,) angles, rad, at which the beam was seen, n ≥ 1; they bound the sectors
     positions : where the sensor is, (n, 3) m, at times (n,) s; None if it stands at the origin
+    sectors : messages a turn
     """
     raw = table.dtype == PLOT
     order = np.lexsort((table["cell"], table["pulse"]) if raw else (table["range"], angle))
     table, angle = table[order], angle[order]
-    numbers = _sector_numbers(np.concatenate((active, angle)))
-    step = TURN / SECTORS
+    step = TURN / sectors
+    numbers = _sector_numbers(np.concatenate((active, angle)), sectors)
     # Of raw returns the pulses stay in their order, whatever the last bit of their angles says.
     edge_of = np.floor(np.maximum.accumulate(angle) / step)
     first = np.searchsorted(edge_of, numbers, side="left")
@@ -95,11 +97,11 @@ def cut(
         )
 
 
-def _sector_numbers(active: Array) -> Array:
+def _sector_numbers(active: Array, sectors: int) -> Array:
     """The numbers of the sectors between the first and the last activity, without the holes."""
-    seen = np.unique(np.floor(active / (TURN / SECTORS)))
+    seen = np.unique(np.floor(active / (TURN / sectors)))
     numbers = np.arange(seen[0], seen[-1] + 1.0)
     following = seen[np.minimum(np.searchsorted(seen, numbers), len(seen) - 1)]
     preceding = seen[np.searchsorted(seen, numbers, side="right") - 1]
-    watched: Array = numbers[following - preceding <= LONGEST_SILENCE * SECTORS]
+    watched: Array = numbers[following - preceding <= LONGEST_SILENCE * sectors]
     return watched

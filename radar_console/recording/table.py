@@ -2,9 +2,11 @@
 
 Rows are target reports, or, with the columns pulse, cell and amplitude, raw returns that still go
 through clustering. The beam is inferred from the rows' times and azimuths. Where all rows of a
-scan carry one time, nothing tells when the beam was where: then a scan is one sector over the
-whole turn that ends at that time. (In the Autoferry recordings plots are, measured along the course
-of the boats, 1.8 s older than their time stamp, and a turn takes 1.68 s.)
+scan carry one time, nothing tells when the beam was where. Then a scan is two sectors: the beam is
+south at that time, so that every azimuth lies within half a turn of the beam and belongs to its own
+scan; the eastern half comes at that time, the western half on the way to the next scan. The plots
+keep the time that they have. (In the Autoferry recordings they are, measured along the course of the
+boats, 1.8 s older than it, and a turn takes 1.68 s.)
 """
 
 import difflib
@@ -18,7 +20,7 @@ from numpy.typing import NDArray
 
 from radar_console.core.errors import InputError
 from radar_console.core.geometry import Array, unwrap_near, wrap
-from radar_console.core.messages import CENTROID, NO_CENTROIDS, PLOT, Radar, Sector, Table, blank
+from radar_console.core.messages import CENTROID, PLOT, Radar, Sector, Table, blank
 from radar_console.core.rotation import (
     Encoder,
     encoder_of_marks,
@@ -26,7 +28,7 @@ from radar_console.core.rotation import (
     infer_rotation,
     rotation_of_marks,
 )
-from radar_console.core.sweep import LONGEST_SILENCE, cut, first_turn, stated
+from radar_console.core.sweep import SECTORS, cut, first_turn, stated
 from radar_console.core.units import DEG, KM, TURN
 from radar_console.recording.columns import Columns, read_columns
 
@@ -112,16 +114,15 @@ class PlotTable:
         )
         self.radar = replace(measured, **known)
         self._table = self._plots() if self._raw else self._centroids()
-        self._encoder, self._angle = self._beam(time, azimuth)
+        self._encoder, self._angle, self._active = self._beam(time, azimuth)
         self._span = (float(time[0]), float(time[-1]))
         self.duration = self._span[1] - self._span[0]
 
     def sectors(self) -> Iterator[Sector]:
-        """Every sector from the beginning: 64 a turn, or one a turn where a scan has one time."""
-        if self._stamps is not None:
-            return self._whole_turns()
+        """Every sector from the beginning: 64 a turn, or two where all of a scan has one time."""
         moving = self._position_at if SENSOR[0] in self._values and SENSOR[1] in self._values else None
-        return cut(self.radar, self._encoder, self._table, self._angle, self._angle, moving)
+        count = SECTORS if self._stamps is None else 2
+        return cut(self.radar, self._encoder, self._table, self._angle, self._active, moving, count)
 
     def facts(self) -> list[tuple[str, str]]:
         """Label and value, for the user."""
@@ -225,45 +226,25 @@ class PlotTable:
         ends = np.array([time[scan == number].max() for number in numbers])
         return ends[np.concatenate(([True], np.diff(ends) > 0.0))]
 
-    def _beam(self, time: Array, azimuth: Array) -> tuple[Encoder, Array]:
-        """The encoder and the unwrapped angle of every row."""
+    def _beam(self, time: Array, azimuth: Array) -> tuple[Encoder, Array, Array]:
+        """The encoder, the unwrapped angle of every row, and the angles where the beam was seen."""
         if self._stamps is not None:
             steps = np.maximum(np.round(np.diff(self._stamps) / self.radar.rotation), 1.0)
-            turns = np.concatenate(([1.0], 1.0 + np.cumsum(steps)))
-            encoder = Encoder(self._stamps, turns * TURN, self.radar.rotation)
-            ends = encoder.angle[np.minimum(np.searchsorted(self._stamps, time), len(turns) - 1)]
-            return encoder, ends - TURN + azimuth
+            turn = np.concatenate(([0.0], np.cumsum(steps)))
+            north = turn * TURN
+            # As `cut` computes the edges of its sectors, so that one lies at the very time of the scan.
+            encoder = Encoder(self._stamps, (2.0 * turn + 1.0) * (TURN / 2.0), self.radar.rotation)
+            scan = np.minimum(np.searchsorted(self._stamps, time), len(north) - 1)
+            return encoder, north[scan] + azimuth, np.concatenate((north, encoder.angle))
         if self._raw:
             _, pulses = np.unique(self._values["pulse"], return_index=True)
             encoder, _ = encoder_of_marks(time[pulses], azimuth[pulses], self.radar.rotation)
         else:
             encoder = encoder_of_reports(time, azimuth, self.radar.rotation)
         angle = unwrap_near(azimuth, encoder.angle_at(time))
-        turn = first_turn(encoder, angle)
-        return encoder.shifted(turn), angle + turn * TURN
-
-    def _whole_turns(self) -> Iterator[Sector]:
-        """One sector a turn, ending at the time of its scan; also for turns without plots."""
-        order = np.lexsort((self._table["range"], self._angle))
-        table, turn = self._table[order], np.floor(self._angle[order] / TURN)
-        ends = np.round(self._encoder.angle / TURN)
-        for i, last in enumerate(ends):
-            empty = last - 1 - (ends[i - 1] if i else 0)
-            # A longer hole was not watched.
-            first = last - empty if empty < LONGEST_SILENCE else last
-            for end in np.arange(first, last + 1):
-                start, stop = self._encoder.time_at(np.array([end - 1.0, end]) * TURN).tolist()
-                rows = table[np.searchsorted(turn, end - 1) : np.searchsorted(turn, end - 1, side="right")]
-                yield Sector(
-                    self.radar,
-                    start=start,
-                    stop=stop,
-                    begin=float((end - 1) * TURN),
-                    end=float(end * TURN),
-                    complete=float(end * TURN),
-                    position=tuple(self._position_at(np.array([stop]))[0].tolist()),
-                    centroids=rows if len(rows) else NO_CENTROIDS,
-                )
+        turns = first_turn(encoder, angle)
+        angle = angle + turns * TURN
+        return encoder.shifted(turns), angle, angle
 
     def _position_at(self, time: Array) -> Array:
         """Where the sensor is, (n, 3) m, between the rows' own positions."""

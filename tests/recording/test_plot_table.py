@@ -160,7 +160,7 @@ def test_any_text_is_rows_or_a_reason(tmp_path_factory, junk):
     assert len(rows_of(source)) >= 29  # a quote may swallow the row before it
 
 
-def test_whole_scans_with_one_time_are_whole_turns(tmp_path):
+def test_scans_with_one_time_are_two_halves_of_a_turn(tmp_path):
     rng = np.random.default_rng(0)
     rows = [
         f"{2.5 * scan:.2f},{rng.uniform(50, 500):.1f},{rng.uniform(0, 359):.2f},{scan},{scan},{-2 * scan}"
@@ -173,15 +173,19 @@ def test_whole_scans_with_one_time_are_whole_turns(tmp_path):
     )
     assert source.radar.rotation == 2.5
     sectors = list(source.sectors())
-    assert len(sectors) == 20
-    for scan, sector in enumerate(sectors):
-        assert sector.begin == pytest.approx(scan * TURN)
-        assert sector.end == pytest.approx((scan + 1) * TURN)
-        assert sector.stop == pytest.approx(2.5 * scan)
-        assert sector.start == pytest.approx(2.5 * (scan - 1))
-        assert sector.position == pytest.approx((scan, -2 * scan, 0.0))
-        assert len(sector.centroids) == (0 if scan == 7 else 4)
-        assert (np.diff(sector.centroids["azimuth"]) >= 0).all()
+    assert len(sectors) == 40
+    for scan, (east, west) in enumerate(zip(sectors[::2], sectors[1::2], strict=True)):
+        assert east.begin == pytest.approx(scan * TURN)
+        assert west.end == pytest.approx((scan + 1) * TURN)
+        # The beam is south at the time of the scan.
+        assert east.end == west.begin == pytest.approx((scan + 0.5) * TURN)
+        assert east.stop == west.start == pytest.approx(2.5 * scan)
+        assert west.stop == pytest.approx(2.5 * (scan + 0.5))
+        assert east.position == pytest.approx((scan, -2 * scan, 0.0))
+        for half, sector in enumerate((east, west)):
+            assert (np.floor(sector.centroids["azimuth"] / (TURN / 2)) == half).all()
+            assert (sector.centroids["time"] <= sector.stop).all()
+        assert len(east.centroids) + len(west.centroids) == (0 if scan == 7 else 4)
 
 
 def raw_plots(turns=6, pulses=900, rotation=4.0):
@@ -297,7 +301,7 @@ def test_recorded_harbour_scenes(recording, scene, scans, rows):
     assert source.radar.rotation == pytest.approx(1.68, abs=0.005)
     assert source.skipped == {}
     sectors = list(source.sectors())
-    assert len(sectors) == scans
+    assert len(sectors) == 2 * scans
     assert sum(len(s.centroids) for s in sectors) == rows
     for before, after in itertools.pairwise(sectors):
         assert after.begin == before.end
