@@ -86,6 +86,7 @@ class Ppi(pg.GraphicsView):
         self._overlay = Overlay()
         self._sweep = Sweep()
         self._lit = 0
+        self._history = picture.history
         self._overlay_age = math.inf
         self._drawn: tuple[Any, ...] = ()
         self._phosphor_drawn: tuple[Any, ...] = ()
@@ -125,15 +126,16 @@ class Ppi(pg.GraphicsView):
 
     def refresh(self) -> None:
         """Everything as it now is, without passage of time: after a change that should show at once."""
+        before = self._sweep.angle
         self._sweep.jump(self.picture.beam)
         self._keep_up()
-        self._light_new(self._sweep.angle)
+        self._light_new(before)
         self._paint_overlay()
         self._develop(0.0)
         self.viewport().update()
 
     def clear(self) -> None:
-        """Forget the glow: the picture has been cleared, or jumped."""
+        """Forget the glow; done without being asked when the picture has been cleared."""
         self._lit = 0
         self._sweep.jump(self.picture.beam)
         self._phosphor.clear()
@@ -184,6 +186,9 @@ class Ppi(pg.GraphicsView):
         """Redraw what stands still if the view, the radar or its place has changed."""
         if self.devicePixelRatioF() != self._base.devicePixelRatioF():
             self._allocate()
+        if self.picture.history is not self._history:  # the picture was cleared
+            self._history = self.picture.history
+            self.clear()
         state = (self.view.revision, self.picture.radar, self.picture.position[:2])
         if state == self._drawn:
             return
@@ -248,15 +253,15 @@ class Ppi(pg.GraphicsView):
     def _light_new(self, before: float) -> None:
         """Light the hits that the shown sweep has passed since the last time."""
         history = self.picture.history
-        if history.count < self._lit:  # the picture was cleared
-            self.clear()
         if self.view.afterglow_s == 0:
             self._phosphor.erase(self._device, before, self._sweep.angle)
         rows = history.rows(self._lit, history.count)
-        ahead = np.flatnonzero(history.beam[rows] > self._sweep.angle)
+        # A hit beyond the encoder itself waits for nothing: its source is not exact about azimuth.
+        beam = history.beam[rows]
+        ahead = np.flatnonzero((beam > self._sweep.angle) & (beam <= self.picture.beam))
         if len(ahead):
             rows = rows[: ahead[0]]
-            self._lit = history.count - (history.count - max(self._lit, history.oldest)) + len(rows)
+            self._lit = max(self._lit, history.oldest) + len(rows)
         else:
             self._lit = history.count
         self._light(rows, history.strength[rows])

@@ -5,6 +5,9 @@ from radar_console.core.units import TURN
 _LEAP = 0.5 * TURN
 """A larger step is a jump in the data or a fast replay, which is shown as it comes, rad."""
 
+_LONGEST = 0.6  # s; a longer wait was a pause, not the time of a sector
+_WEIGHT = 0.3  # of the newest interval in their running mean
+
 
 class Sweep:
     """Sectors come in steps of some degrees; between two of them the shown beam moves evenly.
@@ -21,17 +24,19 @@ class Sweep:
         self.angle = 0.0
         self._target = 0.0
         self._waited = 0.0
-        self._interval = 0.05
+        self._interval = 0.0
 
     def jump(self, beam: float) -> None:
         """To the encoder at once."""
         self.angle = self._target = beam
+        self._waited = 0.0
 
     def follow(self, beam: float, wall: float) -> None:
         """Wall time went on by `wall` s; the encoder is at `beam`, rad."""
         self._waited += wall
         if beam != self._target:
-            self._interval += 0.3 * (self._waited - self._interval)
+            weight = _WEIGHT if self._interval else 1.0
+            self._interval += weight * (min(self._waited, _LONGEST) - self._interval)
             self._target, self._waited = beam, 0.0
         gap = beam - self.angle
         if not 0.0 <= gap < _LEAP:
