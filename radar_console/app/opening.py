@@ -10,11 +10,14 @@ import numpy as np
 from radar_console import pipeline, scenario
 from radar_console.core.errors import InputError
 from radar_console.core.messages import Table
-from radar_console.scenario import Configuration
+from radar_console.scenario import Configuration, DisplaySettings
 
 DEMO = "twenty-five"
 ASTERIX_SUFFIXES = (".pcap", ".pcapng", ".ast")
 EXPECTED = "expected a scenario (.toml), an ASTERIX recording (.pcap, .ast) or a plot table (.csv)"
+
+AIR_TRAFFIC = DisplaySettings(range_unit="NM", speed_unit="kn")
+"""How a recorded air-traffic radar is shown unless the configuration says otherwise."""
 
 
 class Source(pipeline.Source, Protocol):
@@ -33,7 +36,6 @@ class Opened:
     ----------
     title : for the screen
     kind : "simulation", "recording" or "plot table"
-    epoch : date and time of data time 0; None if nobody knows
     truth : where the targets are at a time, s; None if nobody knows
     seed : of the tracker
     """
@@ -86,6 +88,8 @@ def open_source(
         from radar_console.asterix.source import AsterixRecording
 
         recording = AsterixRecording(file, sac_sic, settings.radar.message, given)
+        if not any(key.startswith("display.") for key in given):
+            settings = settings.model_copy(update={"display": AIR_TRAFFIC})
         return Opened(recording, settings, file.name, "recording", None, seed or 0)
     if suffix == ".csv":
         from radar_console.recording.table import PlotTable

@@ -9,6 +9,7 @@ azimuths. Times are seconds since UTC midnight of the first record's day and run
 from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from datetime import UTC, datetime, timedelta
 from pathlib import Path
 
 import numpy as np
@@ -77,7 +78,10 @@ class AsterixRecording:
     ----------
     radar, duration, skipped : of `pipeline.Source`; `skipped` is complete from the start
     noted : what was mended or is worth knowing, counted; nothing of it was lost
+    epoch : UTC midnight of the first record's day; None if the file keeps no capture times
     """
+
+    epoch: datetime | None
 
     def __init__(
         self,
@@ -135,6 +139,7 @@ class AsterixRecording:
                 for key, s in sorted(contents.stations.items())
             ),
             ("chosen", self.radar.name),
+            ("date", f"{self.epoch:%Y-%m-%d} UTC" if self.epoch else "not stated"),
             ("time", f"{_clock(self._span[0])} to {_clock(self._span[1])}, {self.duration:,.0f} s"),
             ("rotation", f"{self.radar.rotation:.3f} s, from {self._beam.source}"),
             ("north marks", f"{self._station.norths:,}"),
@@ -188,6 +193,7 @@ class AsterixRecording:
         captured = np.concatenate((marks["captured"], table["captured"]))
         unwrapped = np.empty(len(both))
         unwrapped[order] = unwrap_days(day_time[order], captured[order])
+        self.epoch = _epoch(captured, unwrapped)
         mark_time, time = unwrapped[: len(marks)], unwrapped[len(marks) :]
         azimuth = table["theta"] / 65536.0 * TURN
         if len(marks) >= 2:
@@ -310,6 +316,15 @@ def _choose(file: Path, contents: Contents, wanted: tuple[int, int] | None) -> t
             file, "", f"target reports of {len(with_reports)} radars; expected a choice of SAC/SIC: {listed}"
         )
     return next(iter(with_reports))
+
+
+def _epoch(captured: Array, time: Array) -> datetime | None:
+    """The midnight from which `time` counts, by the capture times since 1970 (of at least half of all)."""
+    dated = captured > DAY  # a format that keeps the time of day only does not know its date
+    if 2 * np.sum(dated) < len(captured) or not len(captured):
+        return None
+    days = round(float(np.median(captured[dated] - time[dated])) / DAY)
+    return datetime(1970, 1, 1, tzinfo=UTC) + timedelta(days=days)
 
 
 def _name(key: tuple[int, int], form: str = "{}/{}") -> str:
