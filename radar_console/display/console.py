@@ -45,11 +45,10 @@ def run(radar: Radar, feed: Feed, controls: Controls, health: Health, options: O
     """
     from PySide6.QtWidgets import QApplication
 
-    from radar_console.display.maps import read_geojson
-    from radar_console.display.window import ConsoleWindow, settings_file
+    from radar_console.display.window import ConsoleWindow, load_map, settings_file
 
     if options.user_map is not None:
-        read_geojson(options.user_map)
+        load_map(radar, options)  # an error of the user's is said before a window opens
     application = QApplication.instance() or QApplication(["radar-console"])
     window = ConsoleWindow(radar, feed, controls, health, options, settings_file())
     # The frame timer gives the interpreter a chance to run this, so that Ctrl+C works.

@@ -194,9 +194,10 @@ class SpeedHistory(QWidget):
 
     def _draw(self, painter: QPainter, box: QRectF, colours: Palette) -> None:
         speed = self._entries["speed"] / self._unit.metres_per_second
-        low, high = _round_span(float(speed.min()), float(speed.max()))
+        # The first passes of a track may show any speed; they must not flatten the rest.
+        low, high = _round_span(*(float(value) for value in np.quantile(speed, [0.05, 0.95])))
         x = box.right() + (self._entries["time"] - self._now) / SPEED_HISTORY_S * box.width()
-        y = box.bottom() - (speed - low) / (high - low) * box.height()
+        y = box.bottom() - np.clip((speed - low) / (high - low), 0.0, 1.0) * box.height()
         painter.setPen(QPen(QColor(*colours.hairline), 1))
         for level in (box.top(), box.bottom()):
             painter.drawLine(QPointF(box.left(), level), QPointF(box.right(), level))

@@ -402,10 +402,10 @@ class ConsoleWindow(QMainWindow):
         width, height = self.scope.width(), self.scope.height()
         self.hint.adjustSize()
         self.hint.move(20, height - self.hint.height() - 14)
-        self.banner.setFixedWidth(
-            min(self.banner.fontMetrics().horizontalAdvance(self.banner.text()) + 40, width // 3)
-        )
-        self.banner.setFixedHeight(self.banner.heightForWidth(self.banner.width()))
+        if self.banner.text():
+            wanted = self.banner.fontMetrics().horizontalAdvance(self.banner.text()) + 40
+            self.banner.setFixedWidth(min(wanted, width // 3))
+            self.banner.setFixedHeight(self.banner.heightForWidth(self.banner.width()))
         self.banner.move(width - self.banner.width() - 20, 16)
 
     # ---- The pointer
