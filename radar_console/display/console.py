@@ -142,7 +142,7 @@ def render(
 
 def panel_width(width: int) -> int:
     """Of the side panel in a window of this width, px."""
-    return min(max(round(0.36 * width), 420), 620)
+    return min(max(round(0.36 * width), 520), 620)
 
 
 def _select_first(window: "ConsoleWindow") -> None:

@@ -35,7 +35,7 @@ SLOW_MS = 333  # tables and figures
 MESSAGE_MS = 2500
 LONGEST_STEP = 0.25  # s of wall time that a late frame may advance the afterglow by
 MAP_REACH = 2.0  # of the instrumented range: what an off-centre view can show
-NARROWEST_PANEL = 440  # px
+NARROWEST_PANEL = 520  # px
 WIDEST_PANEL = 0.42  # of the window
 _PANEL_MARGIN = 24
 
