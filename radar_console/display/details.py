@@ -100,8 +100,7 @@ class Details(QWidget):
         return {
             "hits": f"{len(hits)} {self.tr('of')} {len(entries)} {self.tr('passes')}",
             "probability": probability if math.isfinite(float(last["probability"])) else quantities.NONE,
-            "updated": f"{quantities.significant(ago)} s {self.tr('ago')}, "
-            f"{self.tr('used in')} {quantities.significant(latency)} s",
+            "updated": f"{ago:.1f} s {self.tr('ago')}, {self.tr('in')} {quantities.significant(latency)} s",
         }
 
     def _height(self, one: Any) -> str:
