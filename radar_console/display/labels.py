@@ -19,7 +19,7 @@ CELL = 4
 """Width of a cell of the board, px."""
 
 HIDDEN = -1
-_SYMBOL, _LINE, _FURNITURE, _LABEL = 12, 3, 2, 1000
+_SYMBOL, _LINE, _FURNITURE, _FAINT, _LABEL = 12, 3, 2, 1, 1000
 _TOO_MUCH = 60  # a place that covers more than this is none
 _STAY, _FAR, _AGAINST = 14, 6, 8  # what a move, a distance, a place in the direction of motion costs
 
@@ -37,9 +37,9 @@ def board(width: float, height: float) -> Board:
     return np.zeros((int(height) // CELL + 1, int(width) // CELL + 1), np.int32)
 
 
-def mark_symbols(on: Board, x: Floats, y: Floats, radius: float = 7.0) -> None:
-    """Symbols stand at (n,) x, y."""
-    _mark_boxes(on, x - radius, y - radius, 2.0 * radius, _SYMBOL)
+def mark_symbols(on: Board, x: Floats, y: Floats, radius: float = 7.0, faint: bool = False) -> None:
+    """Symbols stand at (n,) x, y; faint ones may be covered if nothing else is free."""
+    _mark_boxes(on, x - radius, y - radius, 2.0 * radius, _FAINT if faint else _SYMBOL)
 
 
 def mark_box(on: Board, left: float, top: float, width: float, height: float) -> None:

@@ -28,7 +28,7 @@ SYMBOL, CROWDED_SYMBOL = 6.5, 5.0
 """Radius of a track's symbol, px; and in a crowd."""
 
 CROWD = 250
-"""So many tracks on the screen are a crowd."""
+"""More tracks on the screen than these are a crowd."""
 
 _TILE = 20  # px, of a symbol's pixmap
 _BRACKET = 12.0  # px, from the symbol's middle to the bracket
@@ -111,7 +111,8 @@ class Overlay:
         if not view.shows(Layer.TRACKS):
             return
         shown = Shown.of(picture, view, on)
-        self._radius = SYMBOL if len(shown.x) <= CROWD else CROWDED_SYMBOL
+        known = np.count_nonzero(shown.rows["status"] != TrackStatus.TENTATIVE)
+        self._radius = SYMBOL if known <= CROWD else CROWDED_SYMBOL
         self._paint_lost(painter, on, picture, palette)
         if view.shows(Layer.VECTORS):
             self._paint_vectors(painter, shown, palette)
@@ -140,13 +141,15 @@ class Overlay:
             painter.drawStaticText(QPointF(round(x[k] + 9.0), round(y[k] - 7.0)), text)
 
     def _paint_vectors(self, painter: QPainter, shown: Shown, palette: Palette) -> None:
-        """From the rim of the symbol to where the track will be; dashed where it coasts."""
+        """From the rim of the symbol to where the track will be; dashed where it coasts.
+
+        A tentative track has none: its first guess of a velocity says little, and clutter makes many.
+        """
         dx, dy = shown.tip_x - shown.x, shown.tip_y - shown.y
         length = np.hypot(dx, dy)
         status = shown.rows["status"]
         painter.setPen(Qt.PenStyle.NoPen)
         for state, hue, style in (
-            (TrackStatus.TENTATIVE, palette.tentative, Qt.PenStyle.SolidLine),
             (TrackStatus.CONFIRMED, palette.track, Qt.PenStyle.SolidLine),
             (TrackStatus.COASTING, palette.coasting, Qt.PenStyle.DashLine),
         ):
@@ -207,9 +210,12 @@ class Overlay:
         detail: int,
     ) -> None:
         board = labels.board(on.width, on.height)
-        labels.mark_symbols(board, shown.x, shown.y)
+        known = shown.rows["status"] != TrackStatus.TENTATIVE
+        labels.mark_symbols(board, shown.x[~known], shown.y[~known], 4.0, faint=True)
+        x, y = shown.x[known], shown.y[known]
+        labels.mark_symbols(board, x, y)
         if view.shows(Layer.VECTORS):
-            labels.mark_lines(board, shown.x, shown.y, shown.tip_x, shown.tip_y)
+            labels.mark_lines(board, x, y, shown.tip_x[known], shown.tip_y[known])
         for box in occupied:
             labels.mark_box(board, *box)
         titled = shown.numbers > 0
@@ -258,7 +264,7 @@ class Overlay:
         table[:, 0], table[:, 1] = np.round(left), np.round(top)
         table[:, 2:] = np.round(size)
         painter.setPen(Qt.PenStyle.NoPen)
-        painter.setBrush(qcolor(palette.scope, 0.45))
+        painter.setBrush(qcolor(palette.scope, 0.35))
         painter.drawRects(*boxes.drawargs())
 
     def _paint_leaders(
@@ -367,7 +373,7 @@ def _sizes(texts: list[tuple[str, ...]], advance: float, line: float) -> Floats:
 
 
 def _symbol_tiles(palette: Palette, ratio: float, radius: float) -> QPixmap:
-    """Symbols by status, side by side: tentative small and dotted, confirmed full, coasting dashed."""
+    """Symbols by status, side by side: tentative small and dim, confirmed full, coasting dashed."""
     tiles = QPixmap(round(_TILE * 4 * ratio), round(_TILE * ratio))
     tiles.fill(QColor(0, 0, 0, 0))
     painter = QPainter(tiles)
@@ -377,7 +383,7 @@ def _symbol_tiles(palette: Palette, ratio: float, radius: float) -> QPixmap:
     dashes = QPen(qcolor(palette.coasting), 1.6)
     dashes.setDashPattern([2.2, 1.9])
     for status, pen, part in (
-        (TrackStatus.TENTATIVE, QPen(qcolor(palette.tentative), 1.2), 0.62),
+        (TrackStatus.TENTATIVE, QPen(qcolor(palette.tentative, 0.8), 1.0), 0.5),
         (TrackStatus.CONFIRMED, QPen(qcolor(palette.track), 1.6), 1.0),
         (TrackStatus.COASTING, dashes, 1.0),
     ):

@@ -70,6 +70,7 @@ class Picture:
     beam : unwrapped encoder angle, rad
     position : (3,) of the sensor, m east, north, up
     history : the returns, for the phosphor
+    cell_depth : how deep a range cell is, m, as the plots tell it; NaN before two have come
     truth : the newest row of each simulated target, TRUTH
     clock : wall time that the picture has lived, s; advanced by `advance`
     waited : wall time since the encoder last moved, s
@@ -87,6 +88,7 @@ class Picture:
         self.beam = 0.0
         self.position = (0.0, 0.0, 0.0)
         self.history = History()
+        self.cell_depth = float("nan")
         self.truth: Table = empty(TRUTH)
         self.clock = 0.0
         self.waited = 0.0
@@ -189,11 +191,18 @@ class Picture:
         while len(self._turn) > 2 and sector.end - self._turn[1][1] >= TURN * (1.0 - 1e-9):
             self._turn.popleft()
 
+    def _measure_cell(self, plots: Table) -> None:
+        """From the nearest and the farthest plot of a sector."""
+        if len(plots):
+            cells = int(np.ptp(plots["cell"]))
+            self.cell_depth = float(np.ptp(plots["range"])) / cells if cells else self.cell_depth
+
     def _take_hits(self, sector: Sector) -> None:
         plots, centroids = sector.plots, sector.centroids
         added = len(plots) + len(centroids)
         if added == 0:
             return
+        self._measure_cell(plots)
         h = self.history
         rows = np.arange(h.count, h.count + added) % h.capacity
         azimuth = np.concatenate([plots["azimuth"], centroids["azimuth"]])

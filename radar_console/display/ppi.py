@@ -16,6 +16,7 @@ from PySide6.QtGui import QImage, QMouseEvent, QPainter, QPen, QResizeEvent, QWh
 from PySide6.QtWidgets import QStyleOptionGraphicsItem, QWidget
 
 from radar_console.core.geometry import to_polar
+from radar_console.core.messages import TrackStatus
 from radar_console.core.units import TURN
 from radar_console.display import strokes
 from radar_console.display.furniture import (
@@ -41,9 +42,6 @@ from radar_console.display.view import Layer, View
 
 OVERLAY_PERIOD = 0.1
 """Trails, vectors, symbols and labels are painted so often, s of wall time."""
-
-BLIP_DEPTH = 150.0
-"""How deep a plot is drawn in range, m; never thinner than a pixel and a half."""
 
 _BEAM_PARTS = 6.0  # a plot is drawn this part of the beam's width wide: neighbours just touch
 _PICK = 16.0  # px; a click takes the nearest track within it
@@ -285,7 +283,9 @@ class Ppi(pg.GraphicsView):
             return
         shown = np.array([self.view.shows(Layer.PLOTS), self.view.shows(Layer.CENTROIDS)])
         kept = shown[self.picture.history.kind[rows]]
-        blip, ratio = (radar.beam_width / _BEAM_PARTS, BLIP_DEPTH), self._base.devicePixelRatioF()
+        depth = self.picture.cell_depth
+        blip = (radar.beam_width / _BEAM_PARTS, 2.0 * radar.sd_range if math.isnan(depth) else depth)
+        ratio = self._base.devicePixelRatioF()
         self._phosphor.light(
             self._device, self.picture.history, rows[kept], glow[kept], self.picture.position, blip, ratio
         )
@@ -426,8 +426,8 @@ def _image(width: int, height: int, ratio: float) -> tuple[QImage, Pixels]:
 
 
 def _draw_trails(pixels: Pixels, on: Projection, picture: Picture, length: float, palette: Palette) -> None:
-    """All trails at once; they fade with age."""
-    points = picture.trails
+    """The trails of all tracks but the tentative ones, at once; they fade with age."""
+    points = picture.trails[picture.tracks["status"] != TrackStatus.TENTATIVE]
     fresh = points[:, :, 2] > picture.time - length
     used = np.flatnonzero(fresh.any(axis=0))
     if len(used) == 0:

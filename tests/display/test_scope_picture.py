@@ -151,6 +151,18 @@ def test_hits_are_kept_polar_with_ground_range_and_unwrapped_beam() -> None:
     assert history.strength[0] < history.strength[1] == 1.0
 
 
+def test_the_depth_of_a_range_cell_is_read_from_the_plots() -> None:
+    picture = Picture()
+    plots = blank(PLOT, 3)
+    plots["cell"], plots["range"] = [10, 200, 30], [10.5 * 7.5, 200.5 * 7.5, 30.5 * 7.5]
+    picture.take(sector(0, plots=plots[:1].copy()))
+    assert np.isnan(picture.cell_depth)
+    picture.take(sector(1, plots=plots))
+    assert picture.cell_depth == pytest.approx(7.5)
+    picture.take(sector(2, plots=plots[:1].copy()))
+    assert picture.cell_depth == pytest.approx(7.5)
+
+
 @given(st.lists(st.integers(0, 9), max_size=30))
 def test_the_history_is_a_ring_of_the_newest_hits(counts: list[int]) -> None:
     picture = Picture()

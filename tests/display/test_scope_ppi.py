@@ -235,6 +235,17 @@ def test_labels_do_not_outlive_the_tracks(qtbot: QtBot) -> None:
     np.testing.assert_array_equal(bench.pixels(), empty)
 
 
+def test_a_tentative_track_is_a_quiet_symbol_without_label_vector_or_trail(qtbot: QtBot) -> None:
+    bench = Bench(qtbot, {Layer.TRACKS, Layer.LABELS, Layer.VECTORS, Layer.TRAILS})
+    dark = bench.pixels()
+    for k in range(3):
+        guess = track(1, 30 * KM + 5 * KM * k, 10 * KM, v_east=800.0, status=TrackStatus.TENTATIVE, time=k)
+        bench.turn(tracks=guess)
+    changed = np.argwhere(np.abs(bench.pixels() - dark).max(axis=2) > 3)
+    assert 0 < np.ptp(changed, axis=0).max() <= 10
+    assert len(nearest_to(bench.pixels(), NIGHT.track)) == 0
+
+
 def test_the_bracket_stands_about_the_selected_track_alone(qtbot: QtBot) -> None:
     bench = Bench(qtbot)
     bench.turn(tracks=np.concatenate([track(1, 30 * KM, 10 * KM), track(2, -30 * KM, 10 * KM)]))
