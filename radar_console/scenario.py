@@ -280,6 +280,10 @@ class TrackerSettings(Settings):
     resample_below: Annotated[
         Probability, Field(description="resample when N_eff < this part of the particles")
     ] = 0.5
+    outliers: Annotated[
+        float,
+        Field(ge=0, lt=1, description="part of the centroids that err four times as much as they claim"),
+    ] = 0.05
     p_d: Annotated[float, Field(gt=0, lt=1, description="detection probability")] = 0.9
     gate_probability: Annotated[float, Field(gt=0, lt=1)] = 0.9999
     clutter_per_km2: Annotated[
@@ -313,7 +317,9 @@ class DisplaySettings(Settings):
     """How the console starts."""
 
     range_km: Positive | None = None
-    afterglow_s: Annotated[NonNegative, Field(description="time constant; 0 is off")] = 4.0
+    afterglow_s: Annotated[
+        NonNegative | None, Field(description="time constant; 0 is off; without it, one turn of the antenna")
+    ] = None
     trail_s: NonNegative = 60.0
     vector_s: NonNegative = 60.0
     speed_unit: Literal["km/h", "kn", "m/s"] = "km/h"

@@ -22,6 +22,8 @@ from radar_console.estimation.gaussian import Array
 Singles = NDArray[np.float32]
 
 _NORMALS_BITS = 16
+_LEAST = 1e-30  # of a sum of weights
+BROAD = 16.0  # variance of an outlier, in units of the claimed one
 
 
 def normals() -> Singles:
@@ -90,19 +92,24 @@ def weigh(
     z: Array,
     R: Array,
     lag: float,
+    outliers: float,
     relative: Singles,
 ) -> tuple[float, float]:
     """Likelihood of each particle for a position seen `lag` s after the particles' time.
+
+    The measurement's density is (1 - ε) N(z; x, R) + ε N(z; x, 16 R): a plot that was merged with a
+    neighbour's must not carry the whole cloud away. ε = 0 is the Gaussian.
 
     Parameters
     ----------
     z : (2,) offset of the measurement from the anchor at its own time, in the track's axes
     R : (3,) its covariance there: aa, ab, bb
+    outliers : ε, in [0, 1)
 
     Returns
     -------
-    log ĝ = log Σ w_i N(z; x_i, R), and Σ w_i `relative`_i, where `relative` (N,) is filled with the
-    particles' likelihoods divided by the largest: nothing underflows, however far z is out.
+    log ĝ = log Σ w_i g(x_i), and Σ w_i `relative`_i, where `relative` (N,) is filled with the
+    particles' likelihoods up to a common factor: nothing underflows, however far z is out.
     """
     # R = L Lᵀ; the whitened difference is L⁻¹ (z - x).
     l_aa = math.sqrt(R[0])
@@ -120,13 +127,26 @@ def weigh(
         d2 = u * u + v * v
         relative[i] = d2
         nearest = min(nearest, d2)
-    half = np.float32(0.5)
+    # With y the broad component, the narrow one is y^16, both relative to the nearest particle's;
+    # the larger of their factors is 1.
+    log_narrow = -0.5 * (1.0 - 1.0 / BROAD) * float(nearest)
+    log_broad = math.log(outliers / ((1.0 - outliers) * BROAD)) if outliers > 0.0 else -math.inf
+    log_factor = max(log_narrow, log_broad)
+    narrow = np.float32(math.exp(log_narrow - log_factor))
+    broad = np.float32(math.exp(log_broad - log_factor))
+    scale = np.float32(0.5 / BROAD)
     total = 0.0
     for i in range(count):
-        g = math.exp(half * (nearest - relative[i]))
+        y = np.float32(math.exp(scale * (nearest - relative[i])))
+        y2 = y * y
+        y4 = y2 * y2
+        y8 = y4 * y4
+        g = narrow * y8 * y8 + broad * y
         relative[i] = g
         total += weights[i] * g
-    return math.log(total) - 0.5 * float(nearest) - math.log(2.0 * math.pi * l_aa * l_bb), total
+    total = max(total, _LEAST)
+    log_norm = log_factor + math.log((1.0 - outliers) / (2.0 * math.pi * l_aa * l_bb))
+    return math.log(total) - 0.5 * float(nearest) / BROAD + log_norm, total
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -176,6 +196,28 @@ def moments(particles: Singles, weights: Singles, mean: Array, cov: Array) -> No
                 total += weights[i] * (particles[row, i] - m) * (particles[column, i] - n)
             cov[row, column] = total
             cov[column, row] = total
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def regularise(
+    particles: Singles, mean: Array, cov: Array, width: float, key: Any, table: Singles, scratch: Singles
+) -> None:
+    """Part the copies that resampling made: a kernel of `width` times the cloud's own spread.
+
+    The cloud is shrunk toward its mean by √(1 - width²) first, so that mean and covariance stay
+    what they were. It is left as offsets from `mean` (4,), which the anchor has to take over.
+
+    Source: Liu and West, Combined parameter and state estimation in simulation-based filtering, in
+    Sequential Monte Carlo Methods in Practice, 2001, §10.3.
+    """
+    L = np.empty((4, 4))
+    cholesky(cov, L)
+    draw(scratch, width * L, key, table)
+    shrink = np.float32(math.sqrt(1.0 - width * width))
+    for row in range(4):
+        m = np.float32(mean[row])
+        for i in range(particles.shape[1]):
+            particles[row, i] = shrink * (particles[row, i] - m) + scratch[row, i]
 
 
 @njit(cache=True, nogil=True, error_model="numpy")

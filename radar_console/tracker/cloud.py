@@ -12,10 +12,13 @@ from radar_console.estimation.particle import Singles
 
 _draw, _predict, _weigh, _key = particle.draw, particle.predict, particle.weigh, particle.key
 _normalise, _resample, _moments = particle.normalise, particle.resample, particle.moments
-_cholesky = particle.cholesky
+_cholesky, _regularise = particle.cholesky, particle.regularise
 
 _RESAMPLING = 1 << 40  # added to the pass: the resampling's own random key
 _START = 1 << 41
+_PARTING = 1 << 42
+_KERNEL = 0.25
+_WIDER = 3.0
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -38,7 +41,7 @@ def start(
     P, L = np.empty((4, 4)), np.empty((4, 4))
     _turn(track.P, track.cos, track.sin, P)
     _cholesky(P, L)
-    _draw(particles, L, _key(seed, track.id, track.passes + _START), table)
+    _draw(particles, _WIDER * L, _key(seed, track.id, track.passes + _START), table)
     weights[:] = np.float32(1.0 / weights.size)
 
 
@@ -57,7 +60,7 @@ def advance(track: Any, t: float, q: float, particles: Singles, seed: int, table
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def log_likelihood(
-    track: Any, plot: Any, particles: Singles, weights: Singles, relative: Singles
+    track: Any, plot: Any, outliers: float, particles: Singles, weights: Singles, relative: Singles
 ) -> tuple[float, float]:
     """log ĝ of the plot, and Σ w `relative`; see `particle.weigh`."""
     z, R, anchor = np.empty(2), np.empty(3), track.anchor
@@ -69,7 +72,7 @@ def log_likelihood(
     R[0] = s * s * plot.ee + 2.0 * s * c * plot.en + c * c * plot.nn
     R[1] = s * c * (plot.ee - plot.nn) + (c * c - s * s) * plot.en
     R[2] = c * c * plot.ee - 2.0 * s * c * plot.en + s * s * plot.nn
-    return _weigh(particles, weights, z, R, lag, relative)
+    return _weigh(particles, weights, z, R, lag, outliers, relative)
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -83,6 +86,7 @@ def update(
     particles: Singles,
     weights: Singles,
     seed: int,
+    table: Singles,
 ) -> None:
     """Reweigh by β_0 + Σ_j β_j g_j / ĝ_j, resample when N_eff is low, and take the moments.
 
@@ -112,19 +116,11 @@ def update(
     if effective < resample_below * weights.size:
         scratch = np.empty((4, weights.size), np.float32)
         _resample(particles, weights, _key(seed, track.id, track.passes + _RESAMPLING), scratch)
-        for i in range(4):  # the anchor follows, so that the offsets stay small
-            particles[i] -= np.float32(mean[i])
-            anchor[i] = x[i] - _lost(mean, i, c, s)
-
-
-@njit(cache=True, nogil=True, error_model="numpy")
-def _lost(mean: Array, i: int, c: float, s: float) -> float:
-    """What rounding `mean` to single precision leaves over, in east and north."""
-    p = i & 2
-    a = np.float64(np.float32(mean[p])) - mean[p]
-    b = np.float64(np.float32(mean[p + 1])) - mean[p + 1]
-    left: float = c * a - s * b if i & 1 else s * a + c * b
-    return -left
+        _regularise(
+            particles, mean, cov, _KERNEL, _key(seed, track.id, track.passes + _PARTING), table, scratch
+        )
+        for i in range(4):
+            anchor[i] = x[i]
 
 
 @njit(cache=True, nogil=True, error_model="numpy")

@@ -7,6 +7,7 @@ from numba import njit
 
 MARGIN = math.radians(0.05)
 _TURN = 2.0 * math.pi
+_SPEED_SIGMAS = 2.0
 
 
 def threshold(probability: float) -> float:
@@ -67,7 +68,8 @@ def look(track: Any, starter: bool, beam: Any, par: Any) -> None:
     h = half_width(de, dn, ee, en, nn, track.sd_range, track.sd_azimuth, par.gate)
     r = math.hypot(de, dn)
     if starter:
-        reach = start_reach(track, T, par) + math.sqrt(par.gate) * (track.sd_range + r * track.sd_azimuth)
+        noise = track.sd_range * track.sd_range + (r * track.sd_azimuth) ** 2
+        reach = start_reach(track, T, noise, par)
         if reach < r:
             h = min(h, math.asin(reach / r))
     track.half_width = h
@@ -83,11 +85,32 @@ def look(track: Any, starter: bool, beam: Any, par: Any) -> None:
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def start_reach(track: Any, T: float, par: Any) -> float:
-    """How far from its first plot a starter can be after `T` s, the new plot's noise apart."""
+def start_reach(track: Any, T: float, noise: float, par: Any) -> float:
+    """How far from its first plot a starter's second can be after `T` s; `noise` is its variance."""
     P = track.P
-    reach: float = par.max_speed * T + math.sqrt(par.gate * (P[0, 0] + P[1, 1]))
+    reach: float = par.max_speed * T + _SPEED_SIGMAS * math.sqrt(P[0, 0] + P[1, 1] + noise)
     return reach
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def too_fast(track: Any, par: Any) -> bool:
+    """The track is surely faster than targets are."""
+    x, P = track.x, track.P
+    slack = _SPEED_SIGMAS * math.sqrt(P[2, 2] + P[3, 3])
+    return bool(math.hypot(x[2], x[3]) > par.max_speed + slack)
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def density_of(track: Any, T: float, plot: Any, scale: float, q: float) -> float:
+    """N(z; ẑ, S), m⁻², of a plot `T` s after the track's time, its covariance times `scale`."""
+    e, n, ee, en, nn = predicted(track, T, q)
+    ee += scale * plot.ee
+    en += scale * plot.en
+    nn += scale * plot.nn
+    de, dn = plot.e - e, plot.n - n
+    det = ee * nn - en * en
+    d2 = (nn * de * de - 2.0 * en * de * dn + ee * dn * dn) / det
+    return math.exp(-0.5 * d2) / (_TURN * math.sqrt(det))
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -104,7 +127,6 @@ def density(track: Any, starter: bool, plot: Any, par: Any) -> float:
     if not d2 <= par.gate:
         return 0.0
     if starter:
-        reach = start_reach(track, T, par) + math.sqrt(par.gate * (plot.ee + plot.nn))
-        if math.hypot(de, dn) > reach:
+        if math.hypot(de, dn) > start_reach(track, T, plot.ee + plot.nn, par):
             return 0.0
     return math.exp(-0.5 * d2) / (_TURN * math.sqrt(det))

@@ -24,7 +24,7 @@ from radar_console.tracker.records import (
     TENTATIVE,
 )
 
-_wrap, _start_cloud = gating.wrap, cloud.start
+_wrap, _too_fast, _start_cloud = gating.wrap, gating.too_fast, cloud.start
 _TURN = 2.0 * math.pi
 _FIRST_SCORE = math.log(0.1 / 0.9)  # one plot in ten is a new target's
 _TENTATIVE, _CONFIRMED = int(TrackStatus.TENTATIVE), int(TrackStatus.CONFIRMED)
@@ -107,14 +107,20 @@ def _promote(
     while left:
         hits += left & 1
         left >>= 1
-    if track.level == TENTATIVE and hit and hits >= par.confirm_hits and track.score >= par.confirm_score:
+    if (
+        track.level == TENTATIVE
+        and hit
+        and not _too_fast(track, par)
+        and hits >= par.confirm_hits
+        and track.score >= par.confirm_score
+    ):
         track.level, track.slot = CONFIRMED, size[N_SLOTS]
         owner[track.slot] = index
         size[N_SLOTS] += 1
         _start_cloud(track, beam.e, beam.n, particles[track.slot], weights[track.slot], par.seed, table)
         count[C_CONFIRMED] += 1
         return _CONFIRMED
-    if hits + max(par.confirm_passes - track.passes, 0) < par.confirm_hits:
+    if hits + max(par.confirm_passes - track.passes, 0) < par.confirm_hits or _too_fast(track, par):
         track.dead = True
         count[C_DELETED] += 1
         return _DELETED

@@ -82,6 +82,7 @@ PARAMETERS = np.dtype(
         ("confirm_score", "f8"),
         ("delete_misses", "i8"),
         ("resample_below", "f8"),
+        ("outliers", "f8"),
         ("wait", "f8"),  # rad
         ("bin", "f8"),  # rad
         ("max_range", "f8"),

@@ -295,6 +295,7 @@ def _parameters(settings: TrackerSettings, radar: Radar, seed: int) -> NDArray[n
         "confirm_score": settings.confirm_score,
         "delete_misses": settings.delete_misses,
         "resample_below": settings.resample_below,
+        "outliers": settings.outliers,
         "wait": math.radians(settings.wait_deg),
         "bin": TURN / settings.bins,
         "max_range": radar.max_range,

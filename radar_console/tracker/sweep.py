@@ -14,6 +14,7 @@ from numba import njit
 
 from radar_console.estimation.gaussian import Array
 from radar_console.estimation.kalman import predict_in_place, update_in_place
+from radar_console.estimation import particle
 from radar_console.estimation.particle import Singles
 from radar_console.tracker import cloud, clutter, gating, management
 from radar_console.tracker.association import jpda
@@ -33,8 +34,9 @@ from radar_console.tracker.records import (
     TENTATIVE,
 )
 
+_BROAD = particle.BROAD
 _find, _solve, _BUDGET = jpda.find, jpda.solve, jpda.BUDGET
-_look, _density, _MARGIN = gating.look, gating.density, gating.MARGIN
+_look, _density, _density_of, _MARGIN = gating.look, gating.density, gating.density_of, gating.MARGIN
 _estimate, _turn_to, _place = clutter.estimate, clutter.turn_to, clutter.place
 _start, _advance, _log_likelihood, _update = cloud.start, cloud.advance, cloud.log_likelihood, cloud.update
 _serve, _remove, _begin = management.serve, management.remove, management.begin
@@ -268,7 +270,7 @@ def _settle(
                 likelihood, sum_relative = edges[k].density, 1.0
                 if sampled:
                     log_g, sum_relative = _log_likelihood(
-                        track, plot, particles[track.slot], weights[track.slot], relative[n]
+                        track, plot, par.outliers, particles[track.slot], weights[track.slot], relative[n]
                     )
                     likelihood = math.exp(log_g)
                 weight = scale * likelihood * plot.weight
@@ -306,7 +308,7 @@ def _settle(
         if hi > lo:
             if clouds:
                 _update(track, max(1.0 - used, 0.0), beta[lo:hi], total[lo:hi], relative[lo:hi],
-                        par.resample_below, particles[track.slot], weights[track.slot], par.seed)  # fmt: skip
+                        par.resample_below, particles[track.slot], weights[track.slot], par.seed, table)  # fmt: skip
             else:
                 _update_tentative(track, beta[lo:hi], plot_of[lo:hi], pool, par)
         if best >= 0:
@@ -358,15 +360,23 @@ def _update_tentative(track: Any, beta: Array, plot_of: Any, pool: Any, par: Any
         total += beta[j]
         t += beta[j] * (pool[plot_of[j]].t - origin)
     t = max(origin + (t / total if total > 0.0 else 0.0), track.t)
-    z, R, lag = np.empty((m, 2)), np.empty((m, 3)), np.empty(m)
+    predict_in_place(track.x, track.P, t - track.t, par.q)
+    track.t = t
+    # Each plot twice: with the noise it claims, and as an outlier.
+    z, R, lag, part = np.empty((2 * m, 2)), np.empty((2 * m, 3)), np.empty(2 * m), np.empty(2 * m)
     for j in range(m):
         plot = pool[plot_of[j]]
-        z[j, 0], z[j, 1] = plot.e, plot.n
-        R[j, 0], R[j, 1], R[j, 2] = plot.ee, plot.en, plot.nn
-        lag[j] = max(plot.t, track.t) - t
-    predict_in_place(track.x, track.P, t - track.t, par.q)
-    update_in_place(track.x, track.P, z, R, lag, beta)
-    track.t = t
+        later = max(plot.t, t) - t
+        narrow = (1.0 - par.outliers) * _density_of(track, later, plot, 1.0, par.q)
+        broad = par.outliers * _density_of(track, later, plot, _BROAD, par.q)
+        share = broad / (narrow + broad) if narrow + broad > 0.0 else 0.0
+        for k in range(2):
+            n = 2 * j + k
+            z[n, 0], z[n, 1], lag[n] = plot.e, plot.n, plot.t - t
+            scale = _BROAD if k else 1.0
+            R[n, 0], R[n, 1], R[n, 2] = scale * plot.ee, scale * plot.en, scale * plot.nn
+            part[n] = beta[j] * (share if k else 1.0 - share)
+    update_in_place(track.x, track.P, z, R, lag, part)
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
