@@ -39,7 +39,7 @@ def options_of(opened: Opened, user_map: Path | None) -> Options:
         subtitle=f"{subtitle} · {radar.name} · north up",
         tracker_name=f"{tracker.filter} {tracker.particles} · {tracker.associator.upper()}",
         range_m=display.range_km * KM if display.range_km else radar.max_range,
-        afterglow_s=display.afterglow_s,
+        afterglow_s=radar.rotation if display.afterglow_s is None else display.afterglow_s,
         trail_s=display.trail_s,
         vector_s=display.vector_s,
         speed_unit=display.speed_unit,

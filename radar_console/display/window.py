@@ -69,6 +69,7 @@ class ConsoleWindow(QMainWindow):
         chosen, self._trouble = settings.load(settings_file) if settings_file else (settings.Settings(), "")
         self.view = _first_view(radar, options, chosen)
         self.arrived = math.nan
+        self._swept = False
         self._last_tick = math.nan
         self._map: maps.Map | None = None
         self._cursor: tuple[float, float, float, float] | None = None
@@ -179,6 +180,10 @@ class ConsoleWindow(QMainWindow):
         if batch.truth is not None:
             self.picture.take_truth(batch.truth)
         self.scope.advance(elapsed if running else 0.0)
+        if batch.sectors and not self._swept:
+            self._swept = True
+            self.scope.viewport().repaint()
+            log.info("first sweep painted")
         self.governor.note(time.monotonic() - began, elapsed)
 
     def take(self, sector: Sector) -> None:
