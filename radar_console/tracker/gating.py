@@ -126,7 +126,6 @@ def density(track: Any, starter: bool, plot: Any, par: Any) -> float:
     d2 = (nn * de * de - 2.0 * en * de * dn + ee * dn * dn) / det
     if not d2 <= par.gate:
         return 0.0
-    if starter:
-        if math.hypot(de, dn) > start_reach(track, T, plot.ee + plot.nn, par):
-            return 0.0
+    if starter and math.hypot(de, dn) > start_reach(track, T, plot.ee + plot.nn, par):
+        return 0.0
     return math.exp(-0.5 * d2) / (_TURN * math.sqrt(det))

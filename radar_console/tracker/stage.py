@@ -102,8 +102,10 @@ class Tracker:
 
     def push(self, sector: Sector) -> Sector:
         """The sector, with a row for each track that was served by it, hit or missed."""
-        self.counts.clock_back += self._log.time_after(sector.start) or sector.stop < sector.start
-        self.counts.beam_back += self._log.angle_after(sector.end) or sector.end < sector.begin
+        if sector.stop < sector.start or (self._last and sector.start < self._last.stop):
+            self.counts.clock_back += 1
+        if sector.end < sector.begin or (self._last and sector.end < self._last.end):
+            self.counts.beam_back += 1
         self._log.append(sector)
         if self._next_bin is None:
             self._next_bin = math.floor(self._log.angle[0] / self._par["bin"]) + 1
@@ -145,6 +147,8 @@ class Tracker:
         """Centroids as positions in the site's plane."""
         plots = np.zeros(len(table), PENDING)
         angle, (east, north, up) = self._log.at_time(table["time"])
+        # The watermark bounds what a time can say: nothing below it is delivered any more.
+        angle = np.clip(angle, (self._next_bin_number - 1) * self._par["bin"], self._log.angle[-1])
         azimuth = table["azimuth"]
         plots["phi"] = azimuth + TURN * np.round((angle - azimuth) / TURN)
         above_sea = up + (self.radar.site.height if self.radar.site else 0.0)
@@ -223,12 +227,6 @@ class _BeamLog:
         self.time, self.angle = np.zeros(0), np.zeros(0)
         self._position = np.zeros((0, 3))
         self._seen = np.zeros(0, np.bool_)  # the radar looked between the edge before and this one
-
-    def time_after(self, time: float) -> bool:
-        return len(self.time) > 0 and time < self.time[-1]
-
-    def angle_after(self, angle: float) -> bool:
-        return len(self.angle) > 0 and angle < self.angle[-1]
 
     def append(self, sector: Sector) -> None:
         """Time and angle that go back are held where they were."""

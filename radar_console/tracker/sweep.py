@@ -12,9 +12,9 @@ from typing import Any
 import numpy as np
 from numba import njit
 
+from radar_console.estimation import particle
 from radar_console.estimation.gaussian import Array
 from radar_console.estimation.kalman import predict_in_place, update_in_place
-from radar_console.estimation import particle
 from radar_console.estimation.particle import Singles
 from radar_console.tracker import cloud, clutter, gating, management
 from radar_console.tracker.association import jpda
@@ -308,7 +308,8 @@ def _settle(
         if hi > lo:
             if clouds:
                 _update(track, max(1.0 - used, 0.0), beta[lo:hi], total[lo:hi], relative[lo:hi],
-                        par.resample_below, particles[track.slot], weights[track.slot], par.seed, table)  # fmt: skip
+                        par.resample_below, particles[track.slot], weights[track.slot], par.seed,
+                        table)  # fmt: skip
             else:
                 _update_tentative(track, beta[lo:hi], plot_of[lo:hi], pool, par)
         if best >= 0:
@@ -446,7 +447,8 @@ def _tidy(
     buried = 0
     for place in range(opened.size):
         track = tracks[opened[place]]
-        track.served = track.swept = False if track.served else track.swept
+        if track.served:
+            track.served = track.swept = False
         if track.dead:
             dead[buried] = opened[place]
             buried += 1

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from radar_console.core.geometry import wrap
-from radar_console.core.messages import CENTROID, Radar, Sector, blank
+from radar_console.core.messages import CENTROID, NO_TRACKS, Radar, Sector, blank
 from radar_console.core.units import TURN
 
 RADAR = Radar("test", rotation=4.0, max_range=300e3, sd_range=50.0, sd_azimuth=math.radians(0.1))
@@ -131,4 +131,4 @@ def swarm(count, seed=0, max_range=250e3, speed=(100.0, 300.0)):
 
 def rows_of(sectors):
     """All track rows of a stream."""
-    return np.concatenate([sector.tracks for sector in sectors])
+    return np.concatenate([NO_TRACKS, *(sector.tracks for sector in sectors)])
