@@ -282,7 +282,7 @@ class TrackerSettings(Settings):
     ] = 0.5
     outliers: Annotated[
         float,
-        Field(ge=0, lt=1, description="part of the centroids that err four times as much as they claim"),
+        Field(ge=0, lt=1, description="part of the centroids that err eight times as much as they claim"),
     ] = 0.05
     p_d: Annotated[float, Field(gt=0, lt=1, description="detection probability")] = 0.9
     gate_probability: Annotated[float, Field(gt=0, lt=1)] = 0.9999

@@ -23,7 +23,7 @@ Singles = NDArray[np.float32]
 
 _NORMALS_BITS = 16
 _LEAST = 1e-30  # of a sum of weights
-BROAD = 16.0  # variance of an outlier, in units of the claimed one
+BROAD = 64.0  # variance of an outlier, in units of the claimed one
 
 
 def normals() -> Singles:
@@ -97,7 +97,7 @@ def weigh(
 ) -> tuple[float, float]:
     """Likelihood of each particle for a position seen `lag` s after the particles' time.
 
-    The measurement's density is (1 - ε) N(z; x, R) + ε N(z; x, 16 R): a plot that was merged with a
+    The measurement's density is (1 - ε) N(z; x, R) + ε N(z; x, 64 R): a plot that was merged with a
     neighbour's must not carry the whole cloud away. ε = 0 is the Gaussian.
 
     Parameters
@@ -127,7 +127,7 @@ def weigh(
         d2 = u * u + v * v
         relative[i] = d2
         nearest = min(nearest, d2)
-    # With y the broad component, the narrow one is y^16, both relative to the nearest particle's;
+    # With y the broad component, the narrow one is y^64, both relative to the nearest particle's;
     # the larger of their factors is 1.
     log_narrow = -0.5 * (1.0 - 1.0 / BROAD) * float(nearest)
     log_broad = math.log(outliers / ((1.0 - outliers) * BROAD)) if outliers > 0.0 else -math.inf
@@ -138,10 +138,9 @@ def weigh(
     total = 0.0
     for i in range(count):
         y = np.float32(math.exp(scale * (nearest - relative[i])))
-        y2 = y * y
-        y4 = y2 * y2
-        y8 = y4 * y4
-        g = narrow * y8 * y8 + broad * y
+        y4 = (y * y) * (y * y)
+        y16 = (y4 * y4) * (y4 * y4)
+        g = narrow * (y16 * y16) * (y16 * y16) + broad * y
         relative[i] = g
         total += weights[i] * g
     total = max(total, _LEAST)

@@ -18,7 +18,7 @@ _RESAMPLING = 1 << 40  # added to the pass: the resampling's own random key
 _START = 1 << 41
 _PARTING = 1 << 42
 _KERNEL = 0.25
-_WIDER = 3.0
+_WIDER = 3.0  # velocities at confirmation: so young an estimate errs more than its covariance says
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -39,9 +39,12 @@ def start(
     for i in range(4):
         track.anchor[i] = x[i]
     P, L = np.empty((4, 4)), np.empty((4, 4))
+    for i in range(4):
+        for j in range(4):
+            track.P[i, j] *= (_WIDER if i > 1 else 1.0) * (_WIDER if j > 1 else 1.0)
     _turn(track.P, track.cos, track.sin, P)
     _cholesky(P, L)
-    _draw(particles, _WIDER * L, _key(seed, track.id, track.passes + _START), table)
+    _draw(particles, L, _key(seed, track.id, track.passes + _START), table)
     weights[:] = np.float32(1.0 / weights.size)
 
 

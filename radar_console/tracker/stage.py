@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from radar_console.core.geometry import ground_range
-from radar_console.core.messages import CENTROID, TRACK, CentroidFlag, Radar, Sector, Table
+from radar_console.core.messages import CENTROID, NO_TRACKS, TRACK, CentroidFlag, Radar, Sector, Table
 from radar_console.core.units import TURN
 from radar_console.estimation.gaussian import Array
 from radar_console.estimation.measurement import from_polar
@@ -38,7 +38,7 @@ from radar_console.tracker.records import (
 from radar_console.tracker.sweep import sweep
 
 _GRID = 2.0**20  # per s and per m: interpolated values are rounded, so that no cut shows in them
-_LOG = 4096  # sectors that are remembered, to find where the beam was
+_LOG = 2048  # sectors that are remembered, to find where the beam was
 _FEW_TURNS = 4
 
 
@@ -137,7 +137,9 @@ class Tracker:
         plots = self._pending(table[good])
         late = plots["phi"] < (self._next_bin_number - 1) * self._par["bin"]
         self.counts.late += int(late.sum())
-        self._queue = np.concatenate([self._queue[self._size[N_QUEUE] :], plots[~late]])
+        waiting, fresh = self._queue[self._size[N_QUEUE] :], plots[~late]
+        self._queue = np.empty(len(waiting) + len(fresh), PENDING)
+        self._queue[: len(waiting)], self._queue[len(waiting) :] = waiting, fresh
         self._size[N_QUEUE] = 0
         self._queue = self._queue[
             np.lexsort((self._queue["ordinal"], self._queue["range"], self._queue["phi"]))
@@ -191,7 +193,7 @@ class Tracker:
         if final:
             stop += 1  # the bin in which the stream ends
         if stop == first:
-            return np.zeros(0, TRACK)
+            return NO_TRACKS
         beams = self._log.bins(np.arange(first - 1, stop) * width)
         rows: list[Table] = []
         done = 0
@@ -224,41 +226,50 @@ class _BeamLog:
     """Where the beam and the sensor were: edges of the sectors, in the order of angle and of time."""
 
     def __init__(self) -> None:
-        self.time, self.angle = np.zeros(0), np.zeros(0)
-        self._position = np.zeros((0, 3))
-        self._seen = np.zeros(0, np.bool_)  # the radar looked between the edge before and this one
+        self._rows = np.zeros((5, 2 * _LOG))  # time, angle, east, north, up
+        self._seen = np.zeros(2 * _LOG, np.bool_)  # the radar looked between the edge before and this
+        self._count = 0
+
+    @property
+    def time(self) -> Array:
+        return self._rows[0, : self._count]
+
+    @property
+    def angle(self) -> Array:
+        return self._rows[1, : self._count]
 
     def append(self, sector: Sector) -> None:
         """Time and angle that go back are held where they were."""
-        if len(self.time) == 0 or sector.begin > self.angle[-1] + 1e-9:
+        if self._count == 0 or sector.begin > self._rows[1, self._count - 1] + 1e-9:
             self._add(sector.start, sector.begin, sector.position, False)
         self._add(sector.stop, sector.end, sector.position, True)
 
     def _add(self, time: float, angle: float, position: tuple[float, float, float], seen: bool) -> None:
-        if len(self.time):
-            time, angle = max(time, float(self.time[-1])), max(angle, float(self.angle[-1]))
-        keep = slice(-_LOG, None) if len(self.time) >= 2 * _LOG else slice(None)
-        self.time = np.append(self.time[keep], time)
-        self.angle = np.append(self.angle[keep], angle)
-        self._position = np.append(self._position[keep], [position], axis=0)
-        self._seen = np.append(self._seen[keep], seen)
+        n = self._count
+        if n == 2 * _LOG:
+            self._rows[:, :_LOG], self._seen[:_LOG] = self._rows[:, _LOG:].copy(), self._seen[_LOG:].copy()
+            n = _LOG
+        if n:
+            time, angle = max(time, self._rows[0, n - 1]), max(angle, self._rows[1, n - 1])
+        self._rows[:, n] = time, angle, *position
+        self._seen[n] = seen
+        self._count = n + 1
 
     def at_time(self, time: Array) -> tuple[Array, Array]:
         """Angle (n,) of the beam and position (3, n) of the sensor."""
-        angle = np.interp(time, self.time, self.angle)
-        position = [np.interp(time, self.time, column) for column in self._position.T]
+        known = self._rows[:, : self._count]
+        angle, *position = (np.interp(time, known[0], row) for row in known[1:])
         return angle, np.round(np.array(position) * _GRID) / _GRID
 
     def bins(self, edges: Array) -> Any:
         """The bins between `edges` (n + 1,), as a BEAM table (n,)."""
+        t, angle, east, north, _ = self._rows[:, : self._count]
+        found = np.round(np.array([np.interp(edges, angle, row) for row in (t, east, north)]) * _GRID) / _GRID
         beams = np.zeros(len(edges) - 1, BEAM)
-        t = np.round(np.interp(edges, self.angle, self.time) * _GRID) / _GRID
-        beams["phi"], beams["t"], beams["step"] = edges[1:], t[1:], np.diff(t)
-        for name, column in (("e", 0), ("n", 1)):
-            values = np.interp(edges[1:], self.angle, self._position[:, column])
-            beams[name] = np.round(values * _GRID) / _GRID
-        middle = np.searchsorted(self.angle, 0.5 * (edges[1:] + edges[:-1]))
-        beams["seen"] = self._seen[np.minimum(middle, len(self._seen) - 1)]
+        beams["phi"], beams["t"], beams["step"] = edges[1:], found[0, 1:], np.diff(found[0])
+        beams["e"], beams["n"] = found[1:, 1:]
+        middle = np.searchsorted(angle, 0.5 * (edges[1:] + edges[:-1]))
+        beams["seen"] = self._seen[np.minimum(middle, self._count - 1)]
         return beams
 
 

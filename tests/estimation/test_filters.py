@@ -168,7 +168,7 @@ def test_weigh_is_the_mixture_of_two_gaussians():
     relative = np.empty(n, np.float32)
     z, R = np.array([1.0, -2.0]), np.array([[2.0, 0.4], [0.4, 1.0]])
     nu = z - (cloud[:2] + 0.5 * cloud[2:]).T
-    g = 0.9 * np.exp(log_density(nu, R)) + 0.1 * np.exp(log_density(nu, 16 * R))
+    g = 0.9 * np.exp(log_density(nu, R)) + 0.1 * np.exp(log_density(nu, particle.BROAD * R))
     found, total = particle.weigh(cloud, weights, z, np.array([2.0, 0.4, 1.0]), 0.5, 0.1, relative)
     assert found == pytest.approx(math.log(np.sum(weights * g)), abs=1e-5)
     assert np.allclose(relative / relative.sum(), g / g.sum(), rtol=1e-4)
