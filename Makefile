@@ -1,6 +1,8 @@
 # `make run` and `make test` are each enough by themselves: they set up what is missing.
 PYTHON := .venv/bin/python
 READY  := .venv/.ready
+COMPILED := .venv/.compiled
+KERNELS := $(shell grep -rl --include='*.py' njit radar_console)
 JOBS   ?= 2
 ARGS   ?=
 
@@ -14,12 +16,20 @@ setup: $(READY) ## Make .venv with everything from the lock; see to Qt's system 
 
 $(READY): requirements-dev.lock pyproject.toml tools/setup.sh
 	@sh tools/setup.sh
+	@touch $@ $(COMPILED)
+
+# numba keeps what it compiled, but does not notice that a function called from another file has
+# changed: after a change of any kernel, all are compiled anew.
+$(COMPILED): $(READY) $(KERNELS)
+	@echo "compiling the numerical kernels, about a minute" >&2
+	@find radar_console -name '*.nb[ic]' -delete
+	@$(PYTHON) -m radar_console warm-up
 	@touch $@
 
-run: $(READY) ## Open the console; ARGS="--help", ARGS="recording.pcap"
+run: $(COMPILED) ## Open the console; ARGS="--help", ARGS="recording.pcap"
 	@$(PYTHON) -m radar_console $(ARGS)
 
-test: lint ## Lint, then every test; ARGS="tests/core -k wrap" for a part
+test: lint $(COMPILED) ## Lint, then every test; ARGS="tests/core -k wrap" for a part
 	@QT_QPA_PLATFORM=offscreen $(PYTHON) -m pytest -n $(JOBS) --dist loadfile $(ARGS)
 
 lint: $(READY) ## Style, strict types and import contracts
@@ -34,13 +44,13 @@ format: $(READY) ## Rewrite the code in the house's format
 
 BENCHMARKS = $(filter-out benchmarks/__init__.py benchmarks/acceptance.py,$(wildcard benchmarks/*.py))
 
-bench: $(READY) ## Measure everything that benchmarks/ measures on simulated radar
+bench: $(COMPILED) ## Measure everything that benchmarks/ measures on simulated radar
 	@set -e; export QT_QPA_PLATFORM=offscreen; \
 	for file in $(BENCHMARKS); do echo "== $$file"; $(PYTHON) "$$file"; done; \
 	echo "== benchmarks/acceptance.py scenario twenty-five"; \
 	$(PYTHON) benchmarks/acceptance.py scenario twenty-five
 
-pictures: $(READY) ## Make the pictures that README and docs show
+pictures: $(COMPILED) ## Make the pictures that README and docs show
 	@mkdir -p docs/pictures
 	@$(PYTHON) -m radar_console twenty-five --screenshot docs/pictures/twenty-five.png --after 120
 

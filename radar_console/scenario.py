@@ -290,8 +290,9 @@ class TrackerSettings(Settings):
         NonNegative | None, Field(description="false centroids; without it, estimated live")
     ] = None
     process_noise_m2ps3: Annotated[
-        Positive, Field(description="power spectral density of the acceleration")
-    ] = 1.0
+        Positive,
+        Field(description="power spectral density of the acceleration; 1 straight courses, 30 air traffic"),
+    ] = 30.0
     max_speed_mps: Annotated[Positive, Field(description="gate of the two-point start")] = 400.0
     confirm_hits: Annotated[Count, Field(description="M of M-of-N")] = 3
     confirm_passes: Annotated[Count, Field(description="N of M-of-N")] = 5

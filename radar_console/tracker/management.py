@@ -53,9 +53,10 @@ def begin(tracks: Any, plot: Any, par: Any, rows: Any, size: Any) -> None:
     track.wake_angle, track.wake_time = -math.inf, -math.inf
     track.score, track.level = _FIRST_SCORE, STARTER
     track.history, track.passes, track.misses = 1, 1, 0
+    track.last, track.previous = plot.ordinal, -1
     track.slot, track.mode_3a, track.place, track.first = -1, plot.mode_3a, -1, -1
     track.swept = track.served = track.dead = track.claims = False
-    _report(track, _TENTATIVE, True, True, plot, 1.0, False, plot.t, 0.0, rows, size)
+    report(track, _TENTATIVE, True, True, plot, 1.0, False, plot.t, 0.0, rows, size)
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -87,8 +88,10 @@ def serve(
         track.sd_azimuth = max(plot.sd_azimuth, 0.9 * track.sd_azimuth)
         if plot.mode_3a >= 0 and hit:
             track.mode_3a = plot.mode_3a
+        if hit:
+            track.previous, track.last = track.last, plot.ordinal
     status = _promote(track, hit, beam, par, table, particles, weights, owner, index, size, count)
-    _report(track, status, hit, seen, plot, probability, rough, t_pass, par.q, rows, size)
+    report(track, status, hit, seen, plot, probability, rough, t_pass, par.q, rows, size)
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -128,7 +131,7 @@ def _promote(
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _report(
+def report(
     track: Any, status: int, hit: bool, seen: bool, plot: Any, probability: float, rough: bool, t: float,
     q: float, rows: Any, size: Any,
 ) -> None:  # fmt: skip

@@ -27,6 +27,8 @@ STATE = np.dtype(
         ("history", "i8"),  # hits of the last passes, as bits
         ("passes", "i8"),
         ("misses", "i8"),  # in a row
+        ("last", "i8"),  # ordinal of the plot of its last hit
+        ("previous", "i8"),  # of the hit before; -1 none
         ("slot", "i8"),  # of its particles; -1 none
         ("mode_3a", "i8"),
         ("place", "i8"),  # in the list of open tracks; -1 not open
@@ -54,9 +56,8 @@ PENDING = np.dtype(
         ("sd_azimuth", "f8"),
         ("mode_3a", "i8"),
         ("extended", "?"),
-        ("weight", "f8"),  # 1 less what has been used of it
-        ("clutter", "f8"),  # 1 less what confirmed tracks have used of it
-        ("level", "i8"),  # the lowest level of the open tracks that claim it
+        ("weight", "f8"),  # 1 less what confirmed tracks have used of it
+        ("awaited", "?"),  # an open confirmed track claims it
         ("mark", "i8"),  # scratch: first claimant, or column of a cluster
     ]
 )
@@ -92,8 +93,8 @@ PARAMETERS = np.dtype(
 )
 
 # The sweep's own counts, in an int64 array; `stage.Counts` gives them their names.
-C_STARTED, C_CONFIRMED, C_DELETED, C_LOST, C_FORCED, C_APPROXIMATE, C_EXTENDED, C_BLANKED = range(8)
-COUNTS = 8
+C_STARTED, C_CONFIRMED, C_DELETED, C_LOST, C_FORCED, C_APPROXIMATE, C_EXTENDED, C_BLANKED, C_MERGED = range(9)
+COUNTS = 9
 
 # How much of each table is in use, in an int64 array.
 N_TRACKS, N_POOL, N_EDGES, N_SLOTS, N_ROWS, N_QUEUE = range(6)

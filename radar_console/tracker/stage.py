@@ -57,11 +57,22 @@ class Counts:
     forced: int = 0  # clusters that were closed before all their members were served
     approximate: int = 0  # updates whose association was past the exact algorithm's budget
     blanked: int = 0  # passes over sectors where the radar did not look
+    merged: int = 0  # tracks that another one had the same plots as
     clock_back: int = 0  # sectors whose time went back
     beam_back: int = 0  # sectors whose angle went back
 
 
-_SWEPT_COUNTS = ("started", "confirmed", "deleted", "lost", "forced", "approximate", "extended", "blanked")
+_SWEPT_COUNTS = (
+    "started",
+    "confirmed",
+    "deleted",
+    "lost",
+    "forced",
+    "approximate",
+    "extended",
+    "blanked",
+    "merged",
+)
 
 
 class Tracker:
@@ -163,7 +174,7 @@ class Tracker:
         plots["ee"], plots["en"], plots["nn"] = z.cov[:, 0, 0], z.cov[:, 0, 1], z.cov[:, 1, 1]
         plots["t"], plots["ordinal"], plots["mode_3a"] = table["time"], table["ordinal"], table["mode_3a"]
         plots["extended"] = table["flags"] & np.uint32(CentroidFlag.EXTENDED) != 0
-        plots["weight"] = plots["clutter"] = 1.0
+        plots["weight"] = 1.0
         return plots
 
     @property

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 from numba import njit
 
+from radar_console.core.messages import TrackStatus
 from radar_console.estimation import particle
 from radar_console.estimation.gaussian import Array
 from radar_console.estimation.kalman import predict_in_place, update_in_place
@@ -22,6 +23,7 @@ from radar_console.tracker.records import (
     C_APPROXIMATE,
     C_EXTENDED,
     C_FORCED,
+    C_MERGED,
     C_STARTED,
     CONFIRMED,
     N_EDGES,
@@ -39,11 +41,12 @@ _find, _solve, _BUDGET = jpda.find, jpda.solve, jpda.BUDGET
 _look, _density, _density_of, _MARGIN = gating.look, gating.density, gating.density_of, gating.MARGIN
 _estimate, _turn_to, _place = clutter.estimate, clutter.turn_to, clutter.place
 _start, _advance, _log_likelihood, _update = cloud.start, cloud.advance, cloud.log_likelihood, cloud.update
-_serve, _remove, _begin = management.serve, management.remove, management.begin
+_serve, _remove, _begin, _report = management.serve, management.remove, management.begin, management.report
+_DELETED = int(TrackStatus.DELETED)
 
 _PRUNE = 1e-3  # of the miss: a pair that is less likely is no pair
 _LEAST_DENSITY = 1e-15  # m⁻²
-_NOBODY = 99  # level of a plot that no track claims
+_NOBODY = -2  # mark of a plot that no track claims
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -81,7 +84,7 @@ def sweep(
         need[N_POOL] = size[N_POOL] + fresh
         need[N_EDGES] = size[N_EDGES] + opened.size * fresh
         need[N_TRACKS] = size[N_TRACKS] + size[N_POOL] + fresh
-        need[N_ROWS] = size[N_ROWS] + opened.size + size[N_POOL] + fresh
+        need[N_ROWS] = size[N_ROWS] + opened.size + size[N_TRACKS] + size[N_POOL] + fresh
         need[N_SLOTS] = size[N_SLOTS] + opened.size
         if (
             need[N_POOL] > pool.size
@@ -103,6 +106,7 @@ def sweep(
                 level, beam, par, table, clutter_map, tracks, opened, pool, edges, particles, weights,
                 owner, blank, rows, size, count, final,
             )  # fmt: skip
+        _merge(par, tracks, opened, pool, rows, size, count)
         _tidy(
             beam, par, clutter_map, tracks, opened, pool, edges, particles, weights, owner, rows, size, count
         )
@@ -173,14 +177,15 @@ def _close(
     """Serve the clusters of one level that are complete, or have waited too long."""
     n = opened.size
     for p in range(size[N_POOL]):
-        pool[p].level, pool[p].mark = _NOBODY, -1
+        pool[p].awaited, pool[p].mark = False, -1
     parent = np.arange(n)
     for k in range(size[N_EDGES]):
         track, plot = tracks[edges[k].track], pool[edges[k].plot]
         if track.served:
             continue
-        plot.level = min(plot.level, track.level)
-        if track.level != level:
+        if track.level == CONFIRMED:
+            plot.awaited = True
+        if track.level != level or level != CONFIRMED:
             continue
         if plot.mark < 0:
             plot.mark = track.place
@@ -201,7 +206,7 @@ def _close(
             due[root] = True
         k = track.first
         while k >= 0:
-            if pool[edges[k].plot].level < level:
+            if level != CONFIRMED and pool[edges[k].plot].awaited:
                 complete[root] = False
             k = edges[k].next
     members = np.empty(n, np.int64)
@@ -216,8 +221,8 @@ def _close(
         if not complete[root]:
             count[C_FORCED] += 1
         if level == STARTER:
-            _settle_starters(members[:m], beam, par, table, tracks, pool, edges, particles, weights, owner,
-                             blank, rows, size, count, clutter_map)  # fmt: skip
+            _settle_starter(members[0], beam, par, table, tracks, pool, edges, particles, weights, owner,
+                            blank, rows, size, count, clutter_map)  # fmt: skip
         else:
             _settle(level, members[:m], beam, par, table, tracks, pool, edges, particles, weights, owner,
                     blank, rows, size, count, clutter_map)  # fmt: skip
@@ -265,8 +270,8 @@ def _settle(
         k = track.first
         while k >= 0:
             plot = pool[edges[k].plot]
-            # A plot that a better track still waits for is left to it.
-            if plot.weight > 0.0 and plot.level >= level:
+            # A plot that a confirmed track still waits for is left to it.
+            if plot.weight > 0.0 and (clouds or not plot.awaited):
                 likelihood, sum_relative = edges[k].density, 1.0
                 if sampled:
                     log_g, sum_relative = _log_likelihood(
@@ -297,9 +302,8 @@ def _settle(
             plot = pool[plot_of[k]]
             used += beta[k]
             evidence += w[k]
-            plot.weight = max(plot.weight - beta[k], 0.0)
             if clouds:
-                plot.clutter = max(plot.clutter - beta[k], 0.0)
+                plot.weight = max(plot.weight - beta[k], 0.0)
             if best < 0 or beta[k] > beta[best]:
                 best = k
         track.score += math.log(evidence)
@@ -381,51 +385,58 @@ def _update_tentative(track: Any, beta: Array, plot_of: Any, pool: Any, par: Any
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _settle_starters(
-    members: Any, beam: Any, par: Any, table: Singles, tracks: Any, pool: Any, edges: Any,
+def _settle_starter(
+    index: int, beam: Any, par: Any, table: Singles, tracks: Any, pool: Any, edges: Any,
     particles: Singles, weights: Singles, owner: Any, blank: Any, rows: Any, size: Any, count: Any,
     clutter_map: Any,
 ) -> None:  # fmt: skip
-    """Second plots: likeliest pair first, one to one; a mean of two plots would give no velocity."""
-    m, pairs = members.size, 0
-    for i in range(m):
-        k = tracks[members[i]].first
-        while k >= 0:
-            pairs += 1
-            k = edges[k].next
-    row, plot_of, likelihood = np.empty(pairs, np.int64), np.empty(pairs, np.int64), np.empty(pairs)
-    n = 0
-    for i in range(m):
-        k = tracks[members[i]].first
-        while k >= 0:
-            plot = pool[edges[k].plot]
-            if plot.weight >= 0.5 and plot.level >= STARTER:
-                row[n], plot_of[n], likelihood[n] = i, edges[k].plot, edges[k].density
-                pool[edges[k].plot].mark = -1
-                n += 1
-            k = edges[k].next
-    choice, value = np.full(m, -1, np.int64), np.zeros(m)
-    for k in np.argsort(-likelihood[:n], kind="mergesort"):
-        plot = pool[plot_of[k]]
-        if choice[row[k]] < 0 and plot.mark < 0:
-            choice[row[k]], value[row[k]], plot.mark = plot_of[k], likelihood[k], row[k]
-    for i in range(m):
-        track = tracks[members[i]]
-        if not track.swept:
-            continue
-        miss = 1.0 - par.p_d * par.p_g
-        if choice[i] < 0:
-            track.score += math.log(miss)
-            _serve(track, members[i], False, False, pool[0], math.nan, False, beam, par,
-                   table, particles, weights, owner, blank, rows, size, count)  # fmt: skip
-            continue
-        track.score += math.log(miss + par.p_d * value[i] / _false_density(track, beam, par, clutter_map))
-        plot = pool[choice[i]]
-        _update_tentative(track, np.ones(1), choice[i : i + 1], pool, par)
-        plot.weight = 0.0
-        track.level = TENTATIVE
-        _serve(track, members[i], True, True, plot, 1.0, False, beam, par,
+    """The second plot is the likeliest one; a mean of several would give no velocity.
+
+    Other young tracks may take it too: if this pair is wrong, the next one is not robbed by it.
+    """
+    track = tracks[index]
+    best, value, k = -1, 0.0, track.first
+    while k >= 0:
+        plot = pool[edges[k].plot]
+        if plot.weight >= 0.5 and not plot.awaited and edges[k].density > value:
+            best, value = edges[k].plot, edges[k].density
+        k = edges[k].next
+    miss = 1.0 - par.p_d * par.p_g
+    if best < 0:
+        track.score += math.log(miss)
+        _serve(track, index, False, False, pool[0], math.nan, False, beam, par,
                table, particles, weights, owner, blank, rows, size, count)  # fmt: skip
+        return
+    track.score += math.log(miss + par.p_d * value / _false_density(track, beam, par, clutter_map))
+    _update_tentative(track, np.ones(1), np.full(1, best), pool, par)
+    track.level = TENTATIVE
+    _serve(track, index, True, True, pool[best], 1.0, False, beam, par,
+           table, particles, weights, owner, blank, rows, size, count)  # fmt: skip
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _merge(par: Any, tracks: Any, opened: Any, pool: Any, rows: Any, size: Any, count: Any) -> None:
+    """Of tracks with the same last two plots one stays: the confirmed one, else the likelier one.
+
+    A young track that ends on a plot of a confirmed track goes, too.
+    """
+    for place in range(opened.size):
+        a = tracks[opened[place]]
+        if not a.served or a.dead or a.misses > 0:
+            continue
+        for i in range(size[N_TRACKS]):
+            b = tracks[i]
+            if b.last != a.last or b.dead or i == opened[place] or (a.level == CONFIRMED == b.level):
+                continue
+            if a.level != CONFIRMED and b.level != CONFIRMED and (a.previous != b.previous or a.previous < 0):
+                continue
+            first = a.level < b.level or (a.level == b.level and (a.score, -a.id) > (b.score, -b.id))
+            worse = b if first else a
+            worse.dead = worse.served = True
+            count[C_MERGED] += 1
+            _report(worse, _DELETED, False, False, pool[0], math.nan, False, worse.t, par.q, rows, size)
+            if not first:
+                break
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -435,11 +446,11 @@ def _tidy(
 ) -> None:  # fmt: skip
     """Drop the edges of what was served; plots without a claimant start tracks or go; bury the dead."""
     for p in range(size[N_POOL]):
-        pool[p].level = _NOBODY
+        pool[p].mark = _NOBODY
     n = 0
     for k in range(size[N_EDGES]):
         if not tracks[edges[k].track].served:
-            pool[edges[k].plot].level = 0
+            pool[edges[k].plot].mark = 0
             edges[n] = edges[k]
             n += 1
     size[N_EDGES] = n
@@ -456,7 +467,7 @@ def _tidy(
     moved = np.empty(size[N_POOL], np.int64)
     for p in range(size[N_POOL]):
         plot = pool[p]
-        if plot.level == _NOBODY:
+        if plot.mark == _NOBODY:
             _retire(plot, beam, par, clutter_map, tracks, rows, size, count)
         else:
             moved[p] = n
@@ -466,9 +477,8 @@ def _tidy(
     size[N_POOL] = n
     for k in range(size[N_EDGES]):
         edges[k].plot = moved[edges[k].plot]
-    order = np.sort(dead[:buried])
     for k in range(buried - 1, -1, -1):
-        _remove(order[k], tracks, edges, particles, weights, owner, size)
+        _remove(dead[k], tracks, edges, particles, weights, owner, size)
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -480,7 +490,7 @@ def _retire(
         count[C_EXTENDED] += 1
         return
     ring, column = _place(plot.e - beam.e, plot.n - beam.n, par.max_range)
-    clutter_map.fresh[ring, column] += plot.clutter
+    clutter_map.fresh[ring, column] += plot.weight
     if plot.weight >= 0.5:
         _begin(tracks, plot, par, rows, size)
         count[C_STARTED] += 1
