@@ -3,6 +3,7 @@
 import logging
 import os
 import sys
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -165,11 +166,12 @@ def track(
     from radar_console.app import headless
     from radar_console.app.opening import open_source
 
-    figures = headless.track(open_source(source, config, seed, _sac_sic(radar)), output, stats, threaded)
-    _report(figures, output)
+    opened = open_source(source, config, seed, _sac_sic(radar))
+    figures = headless.track(opened, output, stats, threaded)
+    _report(figures, opened.source.noted, output)
 
 
-def _report(figures: dict[str, Any], output: Path) -> None:
+def _report(figures: dict[str, Any], noted: Mapping[str, int], output: Path) -> None:
     skipped = sum(figures["skipped"].values())
     typer.echo(
         f"{figures['scans']} scans, {figures['plots']:,} plots, {figures['centroids']:,} centroids, "
@@ -179,6 +181,8 @@ def _report(figures: dict[str, Any], output: Path) -> None:
     )
     for reason, count in sorted(figures["skipped"].items()):
         typer.echo(f"  skipped {count:,}: {reason}", err=True)
+    for what, count in sorted(noted.items()):
+        typer.echo(f"  noted {count:,}: {what}", err=True)
 
 
 @app.command(

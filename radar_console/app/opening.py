@@ -1,6 +1,6 @@
 """Open whatever the user names: a scenario, a recording, a plot table."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Protocol
@@ -22,6 +22,11 @@ AIR_TRAFFIC = DisplaySettings(range_unit="NM", speed_unit="kn")
 
 class Source(pipeline.Source, Protocol):
     """A source that can also say what it holds."""
+
+    @property
+    def noted(self) -> Mapping[str, int]:
+        """What was mended or is worth knowing, counted; nothing of it was lost."""
+        ...
 
     def facts(self) -> list[tuple[str, str]]:
         """Label and value, for `radar-console info`."""

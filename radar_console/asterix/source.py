@@ -313,7 +313,9 @@ def _choose(file: Path, contents: Contents, wanted: tuple[int, int] | None) -> t
         return wanted
     if len(with_reports) > 1:
         raise InputError(
-            file, "", f"target reports of {len(with_reports)} radars; expected a choice of SAC/SIC: {listed}"
+            file,
+            "",
+            f"target reports of {len(with_reports)} radars; expected a choice (--radar SAC/SIC): {listed}",
         )
     return next(iter(with_reports))
 

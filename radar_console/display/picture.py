@@ -227,7 +227,9 @@ class Picture:
     def _take_once(self, rows: Table) -> None:
         """Rows of tracks that are all different."""
         place = self._places(rows["track"])
-        born = (place < 0) & (rows["status"] != TrackStatus.DELETED)
+        # A single plot has no velocity yet, and is not shown: in clutter nearly all come to nothing.
+        single = (rows["status"] == TrackStatus.TENTATIVE) & (rows["v_east"] == 0) & (rows["v_north"] == 0)
+        born = (place < 0) & (rows["status"] != TrackStatus.DELETED) & ~single
         place[born] = self._append(int(born.sum()))
         rows, place = rows[place >= 0], place[place >= 0]
         ended = rows["status"] == TrackStatus.DELETED

@@ -33,7 +33,7 @@ class Simulator:
     ----------
     radar : the sensor
     duration : s, to the end of the last whole sector
-    skipped : always empty: a simulation has no bad records
+    skipped, noted : always empty: a simulation has no bad records
     names : of the targets in the order of their numbers in the truth
 
     Raises
@@ -73,6 +73,7 @@ class Simulator:
         self.radar = settings.message
         self.duration = float(antenna.time(antenna.edge(self._sectors)))
         self.skipped: dict[str, int] = {}
+        self.noted: dict[str, int] = {}
         given = [target.name for target in scenario.target]
         self.names = tuple(name or str(i + 1) for i, name in enumerate(given)) + tuple(
             str(i + 1) for i in range(len(given), len(built))

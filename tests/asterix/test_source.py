@@ -167,7 +167,9 @@ def test_several_radars_need_a_choice(tmp_path):
     marks_only = [(1000.0, block(34, mark(1000.0, 0, radar=(7, 7))))]
     sent = sorted(scene(6) + other + marks_only, key=lambda item: item[0])
     file = write_pcap(tmp_path / "a", sent)
-    with pytest.raises(InputError, match=r"2 radars; expected a choice of SAC/SIC: 1/2 \(24\), 1/9 \(2\)"):
+    with pytest.raises(
+        InputError, match=r"2 radars; expected a choice \(--radar SAC/SIC\): 1/2 \(24\), 1/9 \(2\)"
+    ):
         AsterixRecording(file)
     with pytest.raises(InputError, match="no target reports of radar 7/7; expected one of 1/2"):
         AsterixRecording(file, (7, 7))

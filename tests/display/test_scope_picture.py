@@ -196,3 +196,15 @@ def test_clear_forgets_everything_but_still_counts_revisions() -> None:
     picture.clear()
     assert picture.revision > before
     assert (len(picture.tracks), picture.radar, picture.history.count) == (0, None, 0)
+
+
+def test_a_single_plot_is_not_shown_until_it_has_a_velocity() -> None:
+    picture = Picture()
+    first = rows(0.0, (1, TrackStatus.TENTATIVE))
+    first["v_east"] = first["v_north"] = 0.0
+    picture.take(sector(0, tracks=first))
+    assert len(picture.tracks) == 0
+    second = rows(4.0, (1, TrackStatus.TENTATIVE))
+    second["v_east"], second["v_north"] = 100.0, 0.0
+    picture.take(sector(1, tracks=second))
+    assert picture.tracks["track"].tolist() == [1]
