@@ -86,6 +86,17 @@ class Chain:
             self.tally.take(sector)
             yield sector
 
+    @property
+    def skipped(self) -> dict[str, int]:
+        """What the source could not use and what the stages had to leave, counted by reason."""
+        counts = self.tracker.counts
+        left = {
+            "plots after the beam had left them": self.clustering.late,
+            "centroids after the beam had left them": counts.late,
+            "centroids with a range, azimuth or time that is no number": counts.invalid,
+        }
+        return dict(self.opened.source.skipped) | {reason: n for reason, n in left.items() if n}
+
     def _timed_tracker(self, sectors: Iterable[Sector]) -> Iterator[Sector]:
         """The tracker stage, its time added up for each turn of the antenna."""
         for sector in sectors:

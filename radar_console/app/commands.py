@@ -3,7 +3,8 @@
 import logging
 import os
 import sys
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -60,6 +61,16 @@ def _sac_sic(text: str | None) -> tuple[int, int] | None:
     if len(parts) != 2 or not all(part.isdigit() and int(part) < 256 for part in parts):
         raise RadarConsoleError(f"--radar {text}: expected two numbers from 0 to 255, such as 226/232")
     return int(parts[0]), int(parts[1])
+
+
+@contextmanager
+def _interruptible(left: str) -> Iterator[None]:
+    """Ctrl+C ends with a sentence that says what is left of the work, and exit code 130."""
+    try:
+        yield
+    except KeyboardInterrupt:
+        typer.echo(f"\nradar-console: interrupted; {left}", err=True)
+        raise typer.Exit(130) from None
 
 
 def _version(wanted: bool) -> None:
@@ -120,7 +131,8 @@ def console(
     logging.basicConfig(level=logging.INFO if verbose else logging.WARNING, format="%(message)s")
     opened = open_source(source, config, seed, _sac_sic(radar))
     if screenshot is not None:
-        live.screenshot(opened, screenshot, after, _size(size), user_map)
+        with _interruptible("no picture was written"):
+            live.screenshot(opened, screenshot, after, _size(size), user_map, speed)
     elif live.display_missing():
         file = Path("radar-console.png")
         typer.echo(
@@ -128,7 +140,8 @@ def console(
             "running without a window, as fast as it can.",
             err=True,
         )
-        live.screenshot(opened, file, after, _size(size), user_map)
+        with _interruptible("no picture was written"):
+            live.screenshot(opened, file, after, _size(size), user_map, speed)
         typer.echo(f"The picture of the console is in {file.resolve()}")
     else:
         raise typer.Exit(live.run(opened, speed, user_map))
@@ -167,7 +180,8 @@ def track(
     from radar_console.app.opening import open_source
 
     opened = open_source(source, config, seed, _sac_sic(radar))
-    figures = headless.track(opened, output, stats, threaded)
+    with _interruptible(f"what was tracked until then is in {output}"):
+        figures = headless.track(opened, output, stats, threaded)
     _report(figures, opened.source.noted, output)
 
 
@@ -204,7 +218,8 @@ def simulate(
     opened = open_source(scenario, seed=seed)
     if opened.truth is None:
         raise RadarConsoleError(f"{scenario}: is a {opened.kind}; expected a scenario (.toml)")
-    plots, rows = headless.simulate(opened, output, truth)
+    with _interruptible(f"what was simulated until then is in {output}"):
+        plots, rows = headless.simulate(opened, output, truth)
     typer.echo(
         f"{plots:,} plots → {output}" + (f", {rows:,} truth rows → {truth}" if truth else ""), err=True
     )

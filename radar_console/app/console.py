@@ -81,9 +81,17 @@ def run(opened: Opened, speed: float, user_map: Path | None) -> int:
 
 
 def screenshot(
-    opened: Opened, file: Path, after: float | None, size: tuple[int, int], user_map: Path | None
+    opened: Opened,
+    file: Path,
+    after: float | None,
+    size: tuple[int, int],
+    user_map: Path | None,
+    speed: float = 1.0,
 ) -> None:
-    """Run `after` seconds of data, or all, as fast as they come, and write a picture of the console."""
+    """Run `after` seconds of data, or all, as fast as they come, and write a picture of the console.
+
+    `speed` is what the status bar says of the playback; nothing waits for a clock here.
+    """
     os.environ.setdefault("QT_QPA_PLATFORM", "offscreen")
     from radar_console.display import console
 
@@ -104,6 +112,7 @@ def screenshot(
             file,
             after,
             size,
+            rate=speed,
         )
 
 

@@ -78,7 +78,7 @@ def figures_of(chain: Chain, wall_s: float) -> dict[str, Any]:
         "tracker_s_per_scan": _spread(np.array(list(tally.tracker_s.values()))),
         "latency_s": _spread(latency),
         "dropped": chain.gauge.sectors_dropped,
-        "skipped": dict(chain.opened.source.skipped),
+        "skipped": chain.skipped,
         "wall_s": round(wall_s, 3),
         "peak_rss_mb": peak_rss_mb(),
     }

@@ -16,7 +16,7 @@ DEMO = "twenty-five"
 ASTERIX_SUFFIXES = (".pcap", ".pcapng", ".ast")
 EXPECTED = "expected a scenario (.toml), an ASTERIX recording (.pcap, .ast) or a plot table (.csv)"
 
-AIR_TRAFFIC = DisplaySettings(range_unit="NM", speed_unit="kn")
+AIR_TRAFFIC = DisplaySettings(range_unit="NM", speed_unit="kn", trail_s=300.0)
 """How a recorded air-traffic radar is shown unless the configuration says otherwise."""
 
 

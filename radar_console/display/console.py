@@ -70,6 +70,7 @@ def screenshot(
     after_s: float | None = None,
     size: tuple[int, int] = SIZE,
     progress: Callable[[float], None] | None = None,
+    rate: float = 1.0,
 ) -> None:
     """Render the console as it is `after_s` seconds into the data (None: at its end) to a PNG file.
 
@@ -78,6 +79,7 @@ def screenshot(
     truth : where the targets are at a time, s
     size : of the picture, px
     progress : called with the data time of every sector, s
+    rate : of the playback, for the status bar
 
     Raises
     ------
@@ -89,7 +91,7 @@ def screenshot(
     from radar_console.display.window import ConsoleWindow
 
     application = QApplication.instance() or QApplication(["radar-console"])
-    still = _Still()
+    still = _Still(rate)
     window = ConsoleWindow(radar, Feed(), still, still, options)
     render(window, sectors, truth, after_s, size, progress)
     image = window.grab().toImage()

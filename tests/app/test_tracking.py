@@ -8,6 +8,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from radar_console.core.messages import Sector
+from radar_console.recording.writing import TrackWriter
+
 Command = Callable[..., int]
 
 COLUMNS = [
@@ -88,3 +91,19 @@ def test_raw_plots_from_a_file_give_the_tracks_of_the_simulation(command: Comman
     assert ends[0].shape == ends[1].shape == (3, 2)
     # The file rounds what was measured, and another random stream moves the particles.
     assert np.abs(ends[0] - ends[1]).max() < 100.0
+
+
+def test_an_interrupted_run_keeps_what_it_has_and_says_so(
+    command: Command, small: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    write = TrackWriter.write
+
+    def interrupted(writer: TrackWriter, sector: Sector) -> None:
+        if sector.stop > 24.0:
+            raise KeyboardInterrupt
+        write(writer, sector)
+
+    monkeypatch.setattr(TrackWriter, "write", interrupted)
+    assert command("track", small, "-o", "t.csv") == 130
+    assert "interrupted; what was tracked until then is in t.csv" in capsys.readouterr().err
+    assert 10.0 < float(rows(small.parent / "t.csv")[-1]["time_s"]) < 24.0
