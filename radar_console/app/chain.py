@@ -5,13 +5,17 @@ import time
 from collections import defaultdict
 from collections.abc import Generator, Iterable, Iterator
 from dataclasses import dataclass, field
+from itertools import islice
 
-from radar_console import pipeline
+from radar_console import pipeline, tracker
 from radar_console.app.opening import Opened
 from radar_console.core.geometry import Array
 from radar_console.core.messages import Sector, TrackStatus
 from radar_console.core.units import TURN
 from radar_console.pipeline import Gauge, Pace, Policy
+from radar_console.plots.clustering import Clustering
+
+PRIMING = 8  # sectors; the first returns load the kernels
 
 
 @dataclass
@@ -62,12 +66,9 @@ class Chain:
     gauge: Gauge = field(default_factory=Gauge)
 
     def __post_init__(self) -> None:
-        from radar_console.plots.clustering import Clustering
-        from radar_console.tracker import Tracker
-
         settings = self.opened.settings
         self.clustering = Clustering(settings.plots, settings.radar)
-        self.tracker = Tracker(settings.tracker, self.opened.source.radar, self.opened.seed)
+        self.tracker = tracker.Tracker(settings.tracker, self.opened.source.radar, self.opened.seed)
 
     def run(
         self, threads: bool = False, pace: Pace | None = None, policy: Policy = Policy.BLOCK
@@ -85,6 +86,11 @@ class Chain:
         for sector in run:
             self.tally.take(sector)
             yield sector
+
+    def prime(self) -> None:
+        """Load what the stages compile, on a chain that is thrown away: live data must not wait for it."""
+        for _ in islice(Chain(self.opened).run(), PRIMING):
+            pass
 
     @property
     def skipped(self) -> dict[str, int]:

@@ -58,6 +58,7 @@ def run(opened: Opened, speed: float, user_map: Path | None) -> int:
 
     def pump() -> None:
         try:
+            chain.prime()
             with closing(chain.run(threads=True, pace=pace, policy=Policy.DROP)) as sectors:
                 for sector in sectors:
                     feed.put(sector)
