@@ -12,16 +12,16 @@ ARGS   ?=
 help: ## Show this list
 	@awk -F ':.*## ' '/^[a-z]+:.*## / { printf "  make %-8s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
 
-setup: $(READY) ## Make .venv with everything from the lock; see to Qt's system libraries
+setup: $(COMPILED) ## Make .venv with everything from the lock; see to Qt's system libraries
 
 $(READY): requirements-dev.lock pyproject.toml tools/setup.sh
 	@sh tools/setup.sh
-	@touch $@ $(COMPILED)
+	@touch $@
 
 # numba keeps what it compiled, but does not notice that a function called from another file has
 # changed: after a change of any kernel, all are compiled anew.
 $(COMPILED): $(READY) $(KERNELS)
-	@echo "compiling the numerical kernels, about a minute" >&2
+	@echo "compiling the numerical kernels, a minute or two" >&2
 	@find radar_console -name '*.nb[ic]' -delete
 	@$(PYTHON) -m radar_console warm-up
 	@touch $@

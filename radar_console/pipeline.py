@@ -49,6 +49,13 @@ class Gauge:
     queues: list["queue.Queue[object]"] = field(default_factory=list)
     sectors_dropped: int = 0
     returns_dropped: int = 0
+    _lock: threading.Lock = field(default_factory=threading.Lock)
+
+    def drop(self, sector: Sector) -> None:
+        """Count a sector that was lost; from any thread."""
+        with self._lock:
+            self.sectors_dropped += 1
+            self.returns_dropped += len(sector.plots) + len(sector.centroids)
 
     @property
     def depth(self) -> int:
@@ -56,12 +63,12 @@ class Gauge:
         return sum(q.qsize() for q in self.queues)
 
 
-def inline(source: Iterable[Sector], *stages: Stage) -> Iterator[Sector]:
+def inline(source: Iterable[Sector], *stages: Stage) -> Generator[Sector]:
     """Run every stage in the caller's thread: deterministic, for tests and Monte Carlo."""
     stream: Iterable[Sector] = source
     for stage in stages:
         stream = stage(stream)
-    return iter(stream)
+    yield from stream
 
 
 def threaded(
@@ -93,6 +100,7 @@ class _Failed:
 
 _END = object()
 _POLL = 0.1  # s; how soon a waiting thread notices that it should stop
+_NAP = 0.02  # s; how soon a waiting pace notices a new rate
 
 
 def _detach(
@@ -148,8 +156,7 @@ def _put_newest(q: "queue.Queue[object]", sector: Sector, gauge: Gauge) -> None:
             except queue.Empty:
                 continue
             if isinstance(oldest, Sector):
-                gauge.sectors_dropped += 1
-                gauge.returns_dropped += len(oldest.plots) + len(oldest.centroids)
+                gauge.drop(oldest)
             continue
         return
 
@@ -166,17 +173,18 @@ class Pace:
     paused: bool = False
 
     def __call__(self, sectors: Iterable[Sector]) -> Iterator[Sector]:
-        due = time.monotonic()
         last: float | None = None
+        ahead = 0.0  # s of data that the next sector is still ahead of the clock
+        looked = time.monotonic()
         for sector in sectors:
-            step = 0.0 if last is None else max(sector.stop - last, 0.0)
+            ahead += 0.0 if last is None else max(sector.stop - last, 0.0)
             last = sector.stop
-            now = time.monotonic()
-            due = max(due + step / self.rate, now - 1.0)  # after a stall, catch up at most a second
-            while self.paused or (wait := due - time.monotonic()) > 0:
-                if self.paused:
-                    time.sleep(0.02)
-                    due += 0.02
-                else:
-                    time.sleep(min(wait, 0.05))
+            while True:
+                now = time.monotonic()
+                ahead -= 0.0 if self.paused else (now - looked) * self.rate
+                looked = now
+                if not self.paused and ahead <= 0.0:
+                    break
+                time.sleep(_NAP if self.paused else min(ahead / self.rate, _NAP))
+            ahead = max(ahead, -self.rate)  # after a stall, catch up at most a second
             yield sector

@@ -276,7 +276,6 @@ class TrackerSettings(Settings):
     filter: Literal["particle"] = "particle"
     associator: Literal["jpda"] = "jpda"
     particles: Annotated[int, Field(ge=10, le=100_000)] = 1000
-    resampling: Literal["systematic"] = "systematic"
     resample_below: Annotated[
         Probability, Field(description="resample when N_eff < this part of the particles")
     ] = 0.5

@@ -163,15 +163,7 @@ make_environment() {
     $pip --no-deps --no-build-isolation --editable .
 }
 
-# Compiled once, the numerical kernels start at once ever after.
-compile_kernels() {
-    say "compiling the numerical kernels"
-    find radar_console -name '*.nb[ic]' -delete
-    .venv/bin/python -m radar_console warm-up >/dev/null || say "not compiled ahead; the first start will be slower"
-}
-
 choose_python
 [ "$(uname -s)" != Linux ] || see_to_libraries
 make_environment
-compile_kernels
 say "ready"

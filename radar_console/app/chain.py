@@ -4,6 +4,7 @@ import math
 import time
 from collections import defaultdict
 from collections.abc import Generator, Iterable, Iterator
+from contextlib import closing
 from dataclasses import dataclass, field
 from itertools import islice
 
@@ -27,13 +28,16 @@ class Tally:
     confirmed: set[int] = field(default_factory=set)
     live: dict[int, int] = field(default_factory=dict)
     data_time: float = 0.0
+    raw: bool = False
     tracker_s: defaultdict[int, float] = field(default_factory=lambda: defaultdict(float))
     latency_s: list[Array] = field(default_factory=list)
 
     def take(self, sector: Sector) -> None:
         """Count what a sector brought at the end of the chain."""
         self.data_time = sector.stop
-        self.plots += len(sector.plots) if len(sector.plots) else len(sector.centroids)
+        self.raw |= len(sector.plots) > 0
+        # Of a source that delivers centroids, they are the plots.
+        self.plots += len(sector.plots) if self.raw else len(sector.centroids)
         self.centroids += len(sector.centroids)
         tracks = sector.tracks
         if not len(tracks):
@@ -83,9 +87,10 @@ class Chain:
             if threads
             else pipeline.inline(source, *stages)
         )
-        for sector in run:
-            self.tally.take(sector)
-            yield sector
+        with closing(run):
+            for sector in run:
+                self.tally.take(sector)
+                yield sector
 
     def prime(self) -> None:
         """Load what the stages compile, on a chain that is thrown away: live data must not wait for it."""

@@ -45,7 +45,10 @@ SourceArgument = Annotated[
 ]
 ConfigOption = Annotated[
     Path | None,
-    typer.Option(metavar="SCENARIO", help="Scenario file with [radar], [plots], [tracker] for a recording."),
+    typer.Option(
+        metavar="SCENARIO",
+        help="Scenario file whose tables radar, plots, tracker and display apply to a recording.",
+    ),
 ]
 SeedOption = Annotated[int | None, typer.Option(min=0, help="Instead of the scenario's seed.")]
 RadarOption = Annotated[
@@ -61,6 +64,14 @@ def _sac_sic(text: str | None) -> tuple[int, int] | None:
     if len(parts) != 2 or not all(part.isdigit() and int(part) < 256 for part in parts):
         raise RadarConsoleError(f"--radar {text}: expected two numbers from 0 to 255, such as 226/232")
     return int(parts[0]), int(parts[1])
+
+
+def _all_different(*files: str | Path | None) -> None:
+    """No file may be read and written, or written twice, by one command."""
+    paths = [Path(file).resolve() for file in files if file is not None]
+    for k, path in enumerate(paths):
+        if path in paths[:k]:
+            raise RadarConsoleError(f"{path.name}: named twice; expected another file for each purpose")
 
 
 @contextmanager
@@ -180,6 +191,7 @@ def track(
     from radar_console.app.opening import open_source
 
     opened = open_source(source, config, seed, _sac_sic(radar))
+    _all_different(source, output, stats)
     with _interruptible(f"what was tracked until then is in {output}"):
         figures = headless.track(opened, output, stats, threaded)
     _report(figures, opened.source.noted, output)
@@ -218,6 +230,7 @@ def simulate(
     opened = open_source(scenario, seed=seed)
     if opened.truth is None:
         raise RadarConsoleError(f"{scenario}: is a {opened.kind}; expected a scenario (.toml)")
+    _all_different(scenario, output, truth)
     with _interruptible(f"what was simulated until then is in {output}"):
         plots, rows = headless.simulate(opened, output, truth)
     typer.echo(

@@ -1,6 +1,7 @@
 """The console on a source: live in a window, or off-screen into a picture."""
 
 import logging
+import math
 import os
 import sys
 import threading
@@ -77,6 +78,7 @@ def run(opened: Opened, speed: float, user_map: Path | None) -> int:
     thread.start()
     code = console.run(opened.source.radar, feed, pace, chain.gauge, options_of(opened, user_map))
     closed.set()
+    pace.paused, pace.rate = False, math.inf  # a thread that waits for the clock goes on at once
     thread.join(2.0)
     return code
 

@@ -1,5 +1,6 @@
 """Open whatever the user names: a scenario, a recording, a plot table."""
 
+import difflib
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -10,13 +11,13 @@ import numpy as np
 from radar_console import pipeline, scenario
 from radar_console.core.errors import InputError
 from radar_console.core.messages import Table
-from radar_console.scenario import Configuration, DisplaySettings
+from radar_console.scenario import Configuration
 
 DEMO = "twenty-five"
 ASTERIX_SUFFIXES = (".pcap", ".pcapng", ".ast")
 EXPECTED = "expected a scenario (.toml), an ASTERIX recording (.pcap, .ast) or a plot table (.csv)"
 
-AIR_TRAFFIC = DisplaySettings(range_unit="NM", speed_unit="kn", trail_s=300.0)
+AIR_TRAFFIC = {"range_unit": "NM", "speed_unit": "kn", "trail_s": 300.0}
 """How a recorded air-traffic radar is shown unless the configuration says otherwise."""
 
 
@@ -93,13 +94,19 @@ def open_source(
         from radar_console.asterix.source import AsterixRecording
 
         recording = AsterixRecording(file, sac_sic, settings.radar.message, given)
-        if not any(key.startswith("display.") for key in given):
-            settings = settings.model_copy(update={"display": AIR_TRAFFIC})
+        usual = {key: value for key, value in AIR_TRAFFIC.items() if f"display.{key}" not in given}
+        settings = settings.model_copy(update={"display": settings.display.model_copy(update=usual)})
         return Opened(recording, settings, file.name, "recording", None, seed or 0)
     if suffix == ".csv":
         from radar_console.recording.table import PlotTable
 
         table = PlotTable(file, settings.radar.message, given)
+        pulses = round(settings.radar.rotation_s * settings.radar.prf_hz)
+        if not table.has_pulses(pulses):
+            what = f"does not go with azimuth_deg at {pulses:,} pulses a turn"
+            raise InputError(
+                file, "pulse", f"{what}; expected --config with the radar's rotation_s and prf_hz"
+            )
         return Opened(table, settings, file.name, "plot table", None, seed or 0)
     raise InputError(file, "", f"unknown kind of file; {EXPECTED}")
 
@@ -113,7 +120,9 @@ def _find(name: str) -> Path:
         return known[name]
     if file.is_dir():
         raise InputError(file, "", f"is a folder; {EXPECTED}")
-    raise InputError(file, "", f"no such file; {EXPECTED}, or one of: {', '.join(known)}")
+    near = difflib.get_close_matches(name, known, n=1)
+    meant = f"did you mean {near[0]}? Otherwise " if near else ""
+    raise InputError(file, "", f"no such file; {meant}{EXPECTED}, or one of: {', '.join(known)}")
 
 
 def _simulation(file: Path, config: Path | None, seed: int | None) -> Opened:

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from radar_console.core.messages import Table
+from radar_console.core.messages import Table, TrackStatus
 
 ENTRY = np.dtype(
     [
@@ -18,7 +18,7 @@ ENTRY = np.dtype(
 
 
 class Logbook:
-    """The last `capacity` passes of all tracks together."""
+    """The last `capacity` passes of all tracks together, from their confirmation on."""
 
     def __init__(self, capacity: int = 1 << 16) -> None:
         self._entries: Table = np.zeros(capacity, ENTRY)
@@ -26,7 +26,8 @@ class Logbook:
 
     def take(self, tracks: Table, stop: float) -> None:
         """Note the rows TRACK of the sector that ended at `stop`, s."""
-        tracks = tracks[-len(self._entries) :]
+        # Young tracks in clutter are many and short: they would push the others out.
+        tracks = tracks[tracks["status"] != TrackStatus.TENTATIVE][-len(self._entries) :]
         rows = np.arange(self._count, self._count + len(tracks)) % len(self._entries)
         for name in ("track", "time", "hit", "plot_time", "probability"):
             self._entries[name][rows] = tracks[name]

@@ -18,6 +18,9 @@ TRAIL_POINTS = 256
 LOST_KEPT = 60.0
 """How long the last position of a lost track stays, s of data time."""
 
+SILENT_TURNS = 10
+"""A track that was not reported for so many turns is over."""
+
 STALLED_AFTER = 1.5
 """An encoder that has not moved for so long is stalled, s of wall time."""
 
@@ -95,6 +98,7 @@ class Picture:
         self.revision = getattr(self, "revision", 0) + 1
         self.sectors = self.plots = self.centroids = 0
         self._turn: deque[tuple[float, float]] = deque()
+        self._message = 0.0  # s that the last sector took
         self._lost: Table = np.empty(0, TRACK)
         self._lost_numbers: Integers = np.empty(0, np.int64)
         self._count = 0
@@ -139,8 +143,8 @@ class Picture:
 
     @property
     def stalled(self) -> bool:
-        """The encoder has stopped."""
-        return self.waited > STALLED_AFTER
+        """The encoder has stopped: it is late by more than its last two messages took."""
+        return self.waited > max(STALLED_AFTER, 2.0 * self._message)
 
     def row_of(self, track: int) -> int | None:
         """The row of `track` in `tracks`; None if it is not alive."""
@@ -173,6 +177,7 @@ class Picture:
         self._measure_turn(sector)
         self._take_hits(sector)
         self._take_tracks(sector.tracks)
+        self._forget(sector.radar.rotation)
         kept = self._lost["time"] > self.time - LOST_KEPT
         self._lost, self._lost_numbers = self._lost[kept], self._lost_numbers[kept]
 
@@ -182,7 +187,17 @@ class Picture:
         self.truth = truth[::-1][last]
         self.revision += 1
 
+    def _forget(self, rotation: float) -> None:
+        """End tracks of which nothing was heard for turns: the row that ended them was dropped."""
+        silent = np.flatnonzero(self.tracks["time"] < self.time - SILENT_TURNS * rotation)
+        if len(silent):
+            self._lose(self.tracks[silent], silent)
+            self._remove(silent)
+
     def _measure_turn(self, sector: Sector) -> None:
+        if sector.end <= sector.begin:
+            return  # what was still to come at the end of a stream
+        self._message = sector.stop - sector.start
         if self._turn and sector.stop <= self._turn[-1][0]:
             self._turn.clear()
         if not self._turn:
@@ -207,7 +222,9 @@ class Picture:
         rows = np.arange(h.count, h.count + added) % h.capacity
         azimuth = np.concatenate([plots["azimuth"], centroids["azimuth"]])
         level = np.where(np.isnan(plots["elevation"]), 1.0, np.cos(plots["elevation"]))
-        below = ground_range(centroids["range"], centroids["height"], sector.position[2])
+        site = sector.radar.site
+        above_sea = sector.position[2] + (site.height if site else 0.0)
+        below = ground_range(centroids["range"], centroids["height"], above_sea)
         h.azimuth[rows] = azimuth
         h.range[rows] = np.concatenate([plots["range"] * level, below])
         h.east[rows], h.north[rows] = sector.position[:2]

@@ -49,12 +49,14 @@ OPTIONAL = (
 )
 NEEDED_IF_PRESENT = (*REQUIRED, *SENSOR, *RAW, "scan")
 NOT_NEGATIVE = ("time_s", "range_m", "pulse", "cell", "scan")
-POSITIVE = ("sd_range_m", "sd_azimuth_deg")
+POSITIVE = ("sd_range_m", "sd_azimuth_deg", "amplitude")
 WHOLE = ("pulse", "cell", "scan")
+MOST = {"cell": 1_000_000, "pulse": 2**53, "scan": 2**53}
 
 # Where nobody states them.
 SD_RANGE, SD_RANGE_PART = 50.0, 1.0 / 200.0  # m; at most so much, and at most this part of the largest range
 SD_AZIMUTH = 0.5 * DEG
+OFF_PULSE = 1.0 * DEG  # an azimuth may be so far from its pulse's
 SAME_BEAM = 5.0 * DEG  # rows of one pulse are nearer to one another in azimuth
 
 
@@ -118,6 +120,13 @@ class PlotTable:
         self._span = (float(time[0]), float(time[-1]))
         self.duration = self._span[1] - self._span[0]
 
+    def has_pulses(self, pulses_per_turn: int) -> bool:
+        """Whether the pulses' numbers go with their azimuths at so many pulses a turn; True of reports."""
+        if not self._raw:
+            return True
+        beam = self._table["pulse"] * (TURN / pulses_per_turn)
+        return float(np.median(np.abs(wrap(self._table["azimuth"] - beam)))) < OFF_PULSE
+
     def sectors(self) -> Iterator[Sector]:
         """Every sector from the beginning: 64 a turn, or two where all of a scan has one time."""
         moving = self._position_at if SENSOR[0] in self._values and SENSOR[1] in self._values else None
@@ -173,6 +182,8 @@ class PlotTable:
                 drop(value < 0.0, f"{name}: negative")
             if name in POSITIVE:
                 drop(value <= 0.0, f"{name}: not positive")
+            if name in MOST:
+                drop(value > MOST[name], f"{name}: above {MOST[name]:,}")
             if name in WHOLE:
                 drop(value != np.floor(value), f"{name}: not a whole number")
         azimuth = columns.values["azimuth_deg"]

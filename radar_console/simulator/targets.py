@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from radar_console.core.geometry import LocalFrame, ground_range, to_cartesian
 from radar_console.core.messages import TRUTH, Table, blank
-from radar_console.core.units import DEG, G0, KM, KMH
+from radar_console.core.units import DEG, G0, KM, KMH, KT
 from radar_console.scenario import Accelerate, Leg, RadarSettings, Swarm, Target, Turn
 
 Array = NDArray[np.floating]
@@ -278,7 +278,7 @@ def _swarm(
     if swarm.max_range_km * KM > limit:
         problems.append((f"{path}.max_range_km", f"exceeds radar.max_range_km = {radar.max_range_km:g}"))
         return []
-    own = np.array(to_cartesian(radar.speed_kt * (1852.0 / 3600.0), radar.course_deg * DEG)) * duration
+    own = np.array(to_cartesian(radar.speed_kt * KT, radar.course_deg * DEG)) * duration
     members = np.empty((0, 4))
     for _ in range(_ATTEMPTS):
         if len(members) >= swarm.count:

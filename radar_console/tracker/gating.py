@@ -74,7 +74,7 @@ def look(track: Any, starter: bool, beam: Any, par: Any) -> None:
             h = min(h, math.asin(reach / r))
     track.half_width = h
     ahead = -h - MARGIN - track.rho
-    if ahead <= 0.0 or h == math.pi:
+    if ahead <= 0.0 or h == math.pi or track.claims:
         track.wake_angle = -math.inf
         return
     # Half of what is ahead is left to the target's motion, and to the growth of its gate.

@@ -161,9 +161,11 @@ class Tracker:
         plots = np.zeros(len(table), PENDING)
         angle, (east, north, up) = self._log.at_time(table["time"])
         # The watermark bounds what a time can say: nothing below it is delivered any more.
-        angle = np.clip(angle, (self._next_bin_number - 1) * self._par["bin"], self._log.angle[-1])
+        closed = (self._next_bin_number - 1) * self._par["bin"]
+        late = angle < closed - 0.5 * TURN  # so late that the nearest turn would be one ahead
+        angle = np.where(late, angle, np.clip(angle, closed, self._log.angle[-1]))
         azimuth = table["azimuth"]
-        plots["phi"] = azimuth + TURN * np.round((angle - azimuth) / TURN)
+        plots["phi"] = azimuth + TURN * np.ceil((angle - azimuth) / TURN - 0.5)
         above_sea = up + (self.radar.site.height if self.radar.site else 0.0)
         plots["range"] = ground_range(table["range"], table["height"], above_sea)
         for name in ("sd_range", "sd_azimuth"):

@@ -454,14 +454,16 @@ def _tidy(
             edges[n] = edges[k]
             n += 1
     size[N_EDGES] = n
-    dead = np.empty(opened.size, np.int64)
-    buried = 0
     for place in range(opened.size):
         track = tracks[opened[place]]
         if track.served:
             track.served = track.swept = False
-        if track.dead:
-            dead[buried] = opened[place]
+    # In the order of the table, so that those moved into a hole below are never among the dead.
+    dead = np.empty(size[N_TRACKS], np.int64)
+    buried = 0
+    for i in range(size[N_TRACKS]):
+        if tracks[i].dead:
+            dead[buried] = i
             buried += 1
     n = 0
     moved = np.empty(size[N_POOL], np.int64)

@@ -125,3 +125,29 @@ def test_without_a_display_the_run_is_headless_and_leaves_a_picture(
     assert "No display" in said.err
     assert str(picture) in said.out
     assert picture.read_bytes().startswith(b"\x89PNG")
+
+
+def test_a_file_is_not_read_and_written_by_one_command(
+    command: Command, small: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    before = small.read_bytes()
+    assert command("track", small, "-o", small) == 2
+    assert "small.toml: named twice" in capsys.readouterr().err
+    assert small.read_bytes() == before
+    assert command("track", small, "-o", "x", "--stats", "x") == 2
+    assert command("simulate", small, "-o", "x", "--truth", "x") == 2
+
+
+def test_raw_plots_want_the_settings_of_their_radar(
+    command: Command, small: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    small.write_text(small.read_text(encoding="utf-8").replace("rotation_s = 4", "rotation_s = 3"))
+    assert command("simulate", small, "-o", "plots.csv") == 0
+    assert command("track", "plots.csv", "-o", "t.csv") == 2
+    assert "expected --config with the radar's rotation_s and prf_hz" in capsys.readouterr().err
+    assert command("track", "plots.csv", "-o", "t.csv", "--config", small) == 0
+
+
+def test_a_mistyped_scenario_is_guessed(command: Command, capsys: pytest.CaptureFixture[str]) -> None:
+    assert command("info", "habour") == 2
+    assert "did you mean harbour?" in capsys.readouterr().err

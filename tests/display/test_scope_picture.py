@@ -13,6 +13,7 @@ from radar_console.display.picture import (
     CENTROID_HIT,
     LOST_KEPT,
     PLOT_HIT,
+    SILENT_TURNS,
     STALLED_AFTER,
     TRAIL_POINTS,
     History,
@@ -208,3 +209,15 @@ def test_a_single_plot_is_not_shown_until_it_has_a_velocity() -> None:
     second["v_east"], second["v_north"] = 100.0, 0.0
     picture.take(sector(1, tracks=second))
     assert picture.tracks["track"].tolist() == [1]
+
+
+def test_a_track_that_is_never_heard_of_again_ends() -> None:
+    """The row that ended it may have been dropped on the way."""
+    picture = Picture()
+    picture.take(sector(0, tracks=rows(0.0, (1, TrackStatus.CONFIRMED))))
+    k = 0
+    while picture.time <= SILENT_TURNS * picture.radar.rotation:
+        assert picture.tracks["track"].tolist() == [1]
+        k += 1
+        picture.take(sector(k))
+    assert len(picture.tracks) == 0

@@ -6,7 +6,7 @@ from datetime import datetime
 import numpy as np
 import pytest
 
-from radar_console.core.messages import TRACK, blank
+from radar_console.core.messages import TRACK, TrackStatus, blank
 from radar_console.display import actions, quantities
 from radar_console.display.governor import Governor
 from radar_console.display.logbook import Logbook
@@ -87,6 +87,7 @@ def test_the_logbook_keeps_the_newest_passes() -> None:
         rows = blank(TRACK, 2)
         rows["track"], rows["time"], rows["plot_time"] = (1, 2), k, k - 0.5
         rows["hit"] = (True, False)
+        rows["status"] = TrackStatus.CONFIRMED
         rows["v_east"], rows["v_north"] = 3.0, 4.0
         book.take(rows, float(k))
     found = book.of(1)

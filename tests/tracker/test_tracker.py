@@ -11,6 +11,7 @@ from radar_console.core.messages import CENTROID, CentroidFlag, Sector, TrackSta
 from radar_console.core.units import TURN
 from radar_console.scenario import TrackerSettings
 from radar_console.tracker import Tracker
+from radar_console.tracker.records import N_TRACKS
 
 
 def settings(**changes):
@@ -384,3 +385,17 @@ def with_values(table, values):
     for name, value in values.items():
         table[name] = value
     return table
+
+
+@pytest.mark.parametrize("bins", [1, 16, 256])
+def test_every_track_that_was_not_ended_is_still_in_the_table(bins):
+    """Ends of several tracks in one bin must not take a live one with them."""
+    scene = Scene(swarm(40, seed=3, max_range=60e3), turns=25, clutter=150 / (math.pi * 60e3**2))
+    settings = TrackerSettings(particles=50, bins=bins)
+    tracker = Tracker(settings, scene.radar, 1)
+    rows = [tracker.push(sector).tracks for sector in scene.sectors()]
+    last = {row["track"]: row["status"] for table in rows for row in table}
+    alive = {track for track, status in last.items() if status != TrackStatus.DELETED}
+    table = tracker._tracks[: tracker._size[N_TRACKS]]
+    assert {int(track) for track in table["id"][~table["dead"]]} == alive
+    assert len(last) > len(alive) > 40
