@@ -1,7 +1,7 @@
 """Figures of whole runs, scored against the truth.
 
 Examples:
-  python benchmarks/acceptance.py scenario twenty-five --seeds 5
+  python benchmarks/acceptance.py scenario twenty-five --first 25 --seeds 10
   python benchmarks/acceptance.py codes flight.pcap
   python benchmarks/acceptance.py positions boats.csv truth.csv --config boats.toml
 """
@@ -33,15 +33,16 @@ def run(chain: Chain) -> Table:
     return np.concatenate(rows) if rows else np.empty(0, TRACK)
 
 
-@app.command(epilog="Example:  python benchmarks/acceptance.py scenario twenty-five --seeds 5")
+@app.command(epilog="Example:  python benchmarks/acceptance.py scenario twenty-five --first 25 --seeds 10")
 def scenario(
     name: str,
-    seeds: Annotated[int, typer.Option(help="Runs, with the scenario's seed and the next ones.")] = 1,
+    seeds: Annotated[int, typer.Option(help="Runs, with one seed after the other.")] = 1,
+    first: Annotated[int | None, typer.Option(help="The first seed (default: the scenario's).")] = None,
     near_m: Annotated[float, typer.Option(help="A track within it of a target is that target's.")] = NEAR,
 ) -> None:
     """Confirmation, loss and false tracks of a simulated scenario."""
-    first = open_source(name).seed
-    for seed in range(first, first + seeds):
+    start = open_source(name).seed if first is None else first
+    for seed in range(start, start + seeds):
         opened = open_source(name, seed=seed)
         chain = Chain(opened)
         tracks = run(chain)

@@ -101,7 +101,8 @@ def _promote(
 ) -> int:  # fmt: skip
     """Confirm, coast or delete; the status after this pass."""
     if track.level == CONFIRMED:
-        if track.misses >= par.delete_misses:
+        # A young track that its misses make less likely than a fresh plot goes before its time.
+        if track.misses >= par.delete_misses or track.score < _FIRST_SCORE:
             track.dead = True
             count[C_LOST] += 1
             return _DELETED
