@@ -71,6 +71,10 @@ class Shown:
         return cls(rows, numbers, x, y, x + rows["v_east"] * ahead, y - rows["v_north"] * ahead)
 
 
+LIVED_TURNS = 12
+"""A track that lived for fewer turns leaves no mark: M of N, and its last misses, take ten."""
+
+
 class Overlay:
     """Paints the tracks; remembers where labels were and the texts that it has laid out.
 
@@ -130,14 +134,17 @@ class Overlay:
 
     def _paint_lost(self, painter: QPainter, on: Projection, picture: Picture, palette: Palette) -> None:
         """A cross where a track was last, with its name."""
-        lost = picture.lost
+        rotation = picture.radar.rotation if picture.radar else 0.0
+        # Those that lived for less were false: their end is no news.
+        lived = ~(picture.lost["time"] - picture.lost["born"] < LIVED_TURNS * rotation)
+        lost, numbers = picture.lost[lived], picture.lost_numbers[lived]
         x, y = on.to_screen(lost["east"] - picture.position[0], lost["north"] - picture.position[1])
         painter.setPen(QPen(qcolor(palette.alarm), 1.6))
         for side in (1.0, -1.0):
             self._draw_lines(painter, x - 5.0, y - 5.0 * side, x + 5.0, y + 5.0 * side)
         painter.setFont(fonts.font(fonts.SMALL))
         for k in range(len(lost)):
-            text = self._text(f"{name(int(picture.lost_numbers[k]))} lost", False)
+            text = self._text(f"{name(int(numbers[k]))} lost", False)
             painter.drawStaticText(QPointF(round(x[k] + 9.0), round(y[k] - 7.0)), text)
 
     def _paint_vectors(self, painter: QPainter, shown: Shown, palette: Palette) -> None:
