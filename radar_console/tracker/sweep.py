@@ -1,9 +1,10 @@
 """The compiled heart: tracks served bin by bin as the beam passes.
 
 At each bin's end every track is asked where the beam stands relative to its own next pass (ρ), and
-how wide its gate is (h). Between ρ = -h and ρ = h it claims plots; when the beam is past the gates
-of all tracks that share plots, their association is solved and each is served: exactly once a pass.
-Confirmed tracks come first, then tentative ones, then starters; what is left over starts tracks.
+how wide its gate is (h). Between ρ = -h and ρ = h it claims plots. When the beam is past the gates of
+all confirmed tracks that share plots, their association is solved and each is served: exactly once a
+pass. Tentative tracks and starters come after them, each on its own, and use no plot up: every plot
+that no confirmed track used starts a track. Tracks that end on the same plots are merged.
 """
 
 import math
