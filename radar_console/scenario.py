@@ -273,8 +273,51 @@ class PlotSettings(Settings):
 class TrackerSettings(Settings):
     """Association, filter, initiation and deletion."""
 
-    filter: Literal["particle"] = "particle"
-    associator: Literal["jpda"] = "jpda"
+    filter: Literal["particle", "kalman", "extended", "unscented", "imm"] = "particle"
+    models: Annotated[
+        tuple[Literal["cv", "ca", "ct", "singer"], ...],
+        Field(
+            max_length=4,
+            description="motion models: constant velocity, constant acceleration, coordinated turn, "
+            "Singer's; several for particle and imm; without it cv, and for imm cv and ct",
+        ),
+    ] = ()
+    proposal: Annotated[
+        Literal["adapted", "optimal", "prior"],
+        Field(description="adapted: velocities marginalised; prior: the bootstrap filter"),
+    ] = "adapted"
+    resampling: Annotated[
+        Literal["systematic", "stratified", "residual", "multinomial"],
+        Field(description="of the proposals prior and optimal; adapted resamples as it draws"),
+    ] = "systematic"
+    likelihood: Annotated[
+        Literal["filter", "gaussian"],
+        Field(description="what associates: the filter's own likelihood, or a Gaussian from its moments"),
+    ] = "filter"
+    associator: Literal["jpda", "gnn", "nn", "pda"] = "jpda"
+    gate: Annotated[
+        Literal["ellipse", "rectangle"], Field(description="rectangle: along and across the line of sight")
+    ] = "ellipse"
+    initiation: Annotated[
+        Literal["auto", "m-of-n", "score", "branching"],
+        Field(description="auto: score, and branching where the clutter is dense"),
+    ] = "auto"
+    identity: Annotated[
+        Literal["use", "ignore"], Field(description="Mode 3/A and Mode S address as evidence")
+    ] = "use"
+    doppler: Literal["use", "ignore"] = "use"
+    dimensions: Annotated[Literal[2, 3], Field(description="3: height too, where reports have one")] = 3
+    manoeuvre_mps2: Annotated[Positive, Field(description="rms acceleration of a manoeuvre")] = 15.0
+    manoeuvre_s: Annotated[
+        Positive, Field(description="how long a manoeuvre lasts; time constant of Singer's model")
+    ] = 20.0
+    straight_s: Annotated[
+        Positive, Field(description="how long straight flight lasts between manoeuvres")
+    ] = 120.0
+    turn_rate_dps: Annotated[Positive, Field(description="rms rate of a turn")] = 3.0
+    max_tracks: Annotated[
+        Count, Field(description="capacity, young tracks included; the least likely young ones go first")
+    ] = 20_000
     particles: Annotated[int, Field(ge=10, le=100_000)] = 1000
     resample_below: Annotated[
         Probability, Field(description="resample when N_eff < this part of the particles")
@@ -310,6 +353,10 @@ class TrackerSettings(Settings):
     def _check(self) -> Self:
         if self.confirm_hits > self.confirm_passes:
             raise PydanticCustomError("order", "confirm_hits must not exceed confirm_passes")
+        if len(set(self.models)) < len(self.models):
+            raise PydanticCustomError("models", "models must not name a model twice")
+        if len(self.models) > 1 and self.filter not in ("particle", "imm"):
+            raise PydanticCustomError("models", "several models need filter particle or imm")
         return self
 
 

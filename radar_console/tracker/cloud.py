@@ -8,7 +8,9 @@ from numba import njit
 
 from radar_console.estimation import particle
 from radar_console.estimation.gaussian import Array
+from radar_console.estimation.kalman import predict_in_place
 from radar_console.estimation.particle import Singles
+from radar_console.tracker.records import Belief
 
 _draw, _predict, _weigh, _key = particle.draw, particle.predict, particle.weigh, particle.key
 _normalise, _resample, _moments = particle.normalise, particle.resample, particle.moments
@@ -22,16 +24,9 @@ _WIDER = 3.0  # velocities at confirmation: so young an estimate errs more than 
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def start(
-    track: Any,
-    sensor_e: float,
-    sensor_n: float,
-    particles: Singles,
-    weights: Singles,
-    seed: int,
-    table: Singles,
-) -> None:
+def start(track: Any, sensor_e: float, sensor_n: float, par: Any, belief: Belief) -> None:
     """Draw the particles from the track's Gaussian; their first axis is its bearing."""
+    particles, weights = belief.particles[track.slot], belief.weights[track.slot]
     x = track.x
     r = math.hypot(x[0] - sensor_e, x[1] - sensor_n)
     track.sin = (x[0] - sensor_e) / r if r > 0.0 else 0.0
@@ -44,27 +39,26 @@ def start(
             track.P[i, j] *= (_WIDER if i > 1 else 1.0) * (_WIDER if j > 1 else 1.0)
     _turn(track.P, track.cos, track.sin, P)
     _cholesky(P, L)
-    _draw(particles, L, _key(seed, track.id, track.passes + _START), table)
+    _draw(particles, L, _key(par.seed, track.id, track.passes + _START), belief.table)
     weights[:] = np.float32(1.0 / weights.size)
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def advance(track: Any, t: float, q: float, particles: Singles, seed: int, table: Singles) -> None:
-    """Draw the particles, and predict their anchor, to the time `t`."""
+def advance(track: Any, t: float, par: Any, belief: Belief) -> None:
+    """Predict the moments, the anchor and the particles to the time `t`."""
     T = t - track.t
     if T <= 0.0:
         return
+    predict_in_place(track.x, track.P, T, par.q)
     anchor = track.anchor
     anchor[0] += T * anchor[2]
     anchor[1] += T * anchor[3]
-    _predict(particles, T, q, _key(seed, track.id, track.passes), table)
+    _predict(belief.particles[track.slot], T, par.q, _key(par.seed, track.id, track.passes), belief.table)
     track.t = t
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def log_likelihood(
-    track: Any, plot: Any, outliers: float, particles: Singles, weights: Singles, relative: Singles
-) -> tuple[float, float]:
+def log_likelihood(track: Any, plot: Any, par: Any, belief: Belief, relative: Singles) -> tuple[float, float]:
     """log ĝ of the plot, and Σ w `relative`; see `particle.weigh`."""
     z, R, anchor = np.empty(2), np.empty(3), track.anchor
     lag = plot.t - track.t
@@ -75,7 +69,8 @@ def log_likelihood(
     R[0] = s * s * plot.ee + 2.0 * s * c * plot.en + c * c * plot.nn
     R[1] = s * c * (plot.ee - plot.nn) + (c * c - s * s) * plot.en
     R[2] = c * c * plot.ee - 2.0 * s * c * plot.en + s * s * plot.nn
-    return _weigh(particles, weights, z, R, lag, outliers, relative)
+    particles, weights = belief.particles[track.slot], belief.weights[track.slot]
+    return _weigh(particles, weights, z, R, lag, par.outliers, relative)
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -85,11 +80,10 @@ def update(
     beta: Array,
     total: Array,
     relative: Singles,
-    resample_below: float,
-    particles: Singles,
-    weights: Singles,
-    seed: int,
-    table: Singles,
+    chosen: Any,
+    pool: Any,
+    par: Any,
+    belief: Belief,
 ) -> None:
     """Reweigh by β_0 + Σ_j β_j g_j / ĝ_j, resample when N_eff is low, and take the moments.
 
@@ -98,7 +92,10 @@ def update(
     miss : β_0
     beta, total : (plots,) β_j, and Σ w `relative`_j
     relative : (plots, N) likelihoods of the particles, relative to the largest
+    chosen : (plots,) rows of the plots in `pool`
     """
+    particles, weights = belief.particles[track.slot], belief.weights[track.slot]
+    seed, table = par.seed, belief.table
     factor = np.empty(weights.size, np.float32)
     factor[:] = np.float32(miss)
     for j in range(beta.size):
@@ -116,7 +113,7 @@ def update(
         x[p] = anchor[p] + s * mean[p] + c * mean[p + 1]
         x[p + 1] = anchor[p + 1] + c * mean[p] - s * mean[p + 1]
     _turn(cov, c, s, track.P)
-    if effective < resample_below * weights.size:
+    if effective < par.resample_below * weights.size:
         scratch = np.empty((4, weights.size), np.float32)
         _resample(particles, weights, _key(seed, track.id, track.passes + _RESAMPLING), scratch)
         _regularise(

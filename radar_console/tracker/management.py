@@ -8,8 +8,7 @@ from numba import njit
 
 from radar_console.core.messages import TrackStatus
 from radar_console.estimation.kalman import predict_in_place
-from radar_console.estimation.particle import Singles
-from radar_console.tracker import cloud, gating
+from radar_console.tracker import filters, gating
 from radar_console.tracker.records import (
     C_BLANKED,
     C_CONFIRMED,
@@ -22,9 +21,10 @@ from radar_console.tracker.records import (
     N_TRACKS,
     STARTER,
     TENTATIVE,
+    Belief,
 )
 
-_wrap, _too_fast, _start_cloud = gating.wrap, gating.too_fast, cloud.start
+_wrap, _too_fast, _start_belief = gating.wrap, gating.too_fast, filters.start
 _TURN = 2.0 * math.pi
 _FIRST_SCORE = math.log(0.1 / 0.9)  # one plot in ten is a new target's
 _TENTATIVE, _CONFIRMED = int(TrackStatus.TENTATIVE), int(TrackStatus.CONFIRMED)
@@ -62,8 +62,7 @@ def begin(tracks: Any, plot: Any, par: Any, rows: Any, size: Any) -> None:
 @njit(cache=True, nogil=True, error_model="numpy")
 def serve(
     track: Any, index: int, hit: bool, seen: bool, plot: Any, probability: float, rough: bool, beam: Any,
-    par: Any, table: Singles, particles: Singles, weights: Singles, owner: Any, blank: Any, rows: Any,
-    size: Any, count: Any,
+    par: Any, belief: Belief, blank: Any, rows: Any, size: Any, count: Any,
 ) -> None:  # fmt: skip
     """Account for one pass of the beam over a track.
 
@@ -90,14 +89,13 @@ def serve(
             track.mode_3a = plot.mode_3a
         if hit:
             track.previous, track.last = track.last, plot.ordinal
-    status = _promote(track, hit, beam, par, table, particles, weights, owner, index, size, count)
+    status = _promote(track, hit, beam, par, belief, index, size, count)
     report(track, status, hit, seen, plot, probability, rough, t_pass, par.q, rows, size)
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def _promote(
-    track: Any, hit: bool, beam: Any, par: Any, table: Singles, particles: Singles, weights: Singles,
-    owner: Any, index: int, size: Any, count: Any,
+    track: Any, hit: bool, beam: Any, par: Any, belief: Belief, index: int, size: Any, count: Any,
 ) -> int:  # fmt: skip
     """Confirm, coast or delete; the status after this pass."""
     if track.level == CONFIRMED:
@@ -119,9 +117,9 @@ def _promote(
         and track.score >= par.confirm_score
     ):
         track.level, track.slot = CONFIRMED, size[N_SLOTS]
-        owner[track.slot] = index
+        belief.owner[track.slot] = index
         size[N_SLOTS] += 1
-        _start_cloud(track, beam.e, beam.n, particles[track.slot], weights[track.slot], par.seed, table)
+        _start_belief(track, beam.e, beam.n, par, belief)
         count[C_CONFIRMED] += 1
         return _CONFIRMED
     if hits + max(par.confirm_passes - track.passes, 0) < par.confirm_hits or _too_fast(track, par):
@@ -153,23 +151,30 @@ def report(
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def remove(
-    index: int, tracks: Any, edges: Any, particles: Singles, weights: Singles, owner: Any, size: Any
-) -> None:
-    """Take a track out; the last one moves into the hole, and so do the particles."""
+def remove(index: int, tracks: Any, edges: Any, belief: Belief, size: Any) -> None:
+    """Take a track out; the last one moves into the hole, and so does what it believes."""
     slot = tracks[index].slot
     if slot >= 0:
         last = size[N_SLOTS] - 1
         if slot != last:
-            particles[slot], weights[slot], owner[slot] = particles[last], weights[last], owner[last]
-            tracks[owner[slot]].slot = slot
+            _move(belief, last, slot)
+            tracks[belief.owner[slot]].slot = slot
         size[N_SLOTS] = last
     last = size[N_TRACKS] - 1
     if index != last:
         tracks[index] = tracks[last]
         if tracks[index].slot >= 0:
-            owner[tracks[index].slot] = index
+            belief.owner[tracks[index].slot] = index
         for k in range(size[N_EDGES]):
             if edges[k].track == last:
                 edges[k].track = index
     size[N_TRACKS] = last
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _move(belief: Belief, source: int, target: int) -> None:
+    belief.owner[target] = belief.owner[source]
+    belief.particles[target], belief.weights[target] = belief.particles[source], belief.weights[source]
+    belief.model[target] = belief.model[source]
+    belief.x[target], belief.P[target] = belief.x[source], belief.P[source]
+    belief.mu[target] = belief.mu[source]

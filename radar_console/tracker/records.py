@@ -1,6 +1,9 @@
 """The tables that the compiled sweep works on."""
 
+from typing import NamedTuple
+
 import numpy as np
+from numpy.typing import NDArray
 
 CONFIRMED, TENTATIVE, STARTER = 0, 1, 2
 """Levels of a track: the lower is served first. A starter has one plot, and no velocity yet."""
@@ -12,6 +15,10 @@ STATE = np.dtype(
         ("t", "f8"),  # s, of x and P
         ("x", "f8", (4,)),  # east, north, v_east, v_north
         ("P", "f8", (4, 4)),
+        ("curve", "f8", (2,)),  # m/s², acceleration of the forecast; see `gating.predicted`
+        ("growth", "f8", (3,)),  # m²/s³, ee, en, nn: the forecast's covariance grows by this times T³
+        ("up", "f8", (2,)),  # m and m/s, height and its rate at t; NaN unknown
+        ("up_P", "f8", (3,)),  # their covariance pp, pv, vv
         ("anchor", "f8", (4,)),  # what the particles are offsets from, at t
         ("cos", "f8"),  # the particles' first axis is the bearing at confirmation
         ("sin", "f8"),
@@ -31,6 +38,8 @@ STATE = np.dtype(
         ("previous", "i8"),  # of the hit before; -1 none
         ("slot", "i8"),  # of its particles; -1 none
         ("mode_3a", "i8"),
+        ("address", "i8"),
+        ("agreed", "i8"),  # hits in a row whose identity was the track's own
         ("place", "i8"),  # in the list of open tracks; -1 not open
         ("first", "i8"),  # of its edges in this bin; -1 none
         ("claims", "?"),  # it has plots in its gate
@@ -52,9 +61,16 @@ PENDING = np.dtype(
         ("ee", "f8"),  # its covariance, m²
         ("en", "f8"),
         ("nn", "f8"),
+        ("s_e", "f8"),  # position of the sensor, m
+        ("s_n", "f8"),
         ("sd_range", "f8"),
         ("sd_azimuth", "f8"),
+        ("up", "f8"),  # height, m; NaN unknown
+        ("uu", "f8"),  # its variance, m²
+        ("doppler", "f8"),  # range rate, m/s; NaN unknown
+        ("sd_doppler", "f8"),
         ("mode_3a", "i8"),
+        ("address", "i8"),
         ("extended", "?"),
         ("weight", "f8"),  # 1 less what confirmed tracks have used of it
         ("awaited", "?"),  # an open confirmed track claims it
@@ -89,8 +105,42 @@ PARAMETERS = np.dtype(
         ("max_range", "f8"),
         ("sd_range", "f8"),
         ("sd_azimuth", "f8"),
+        ("turn", "f8"),  # s, nominal time of a turn of the antenna
+        ("filter", "i8"),  # KALMAN, EXTENDED, ...
+        ("proposal", "i8"),  # PRIOR, OPTIMAL, ADAPTED
+        ("resampling", "i8"),  # SYSTEMATIC, ...
+        ("gaussian", "?"),  # associate by N(z; ẑ, S), not by the filter's own likelihood
+        ("use_doppler", "?"),
+        ("models", "i8"),  # how many motion models
+        ("model", "i8", (4,)),  # CV, CA, CT, SINGER
+        ("leave", "f8", (4,)),  # 1/s, rate at which a target leaves the model; 0 where there is only one
+        ("manoeuvre", "f8"),  # m/s², rms acceleration of a manoeuvre
+        ("manoeuvre_time", "f8"),  # s, mean duration of a manoeuvre; Singer's time constant
+        ("turn_rate", "f8"),  # rad/s, rms rate of a turn
     ]
 )
+
+KALMAN, EXTENDED, UNSCENTED, IMM, PARTICLE = range(5)
+PRIOR, OPTIMAL, ADAPTED = range(3)
+SYSTEMATIC, STRATIFIED, RESIDUAL, MULTINOMIAL = range(4)
+CV, CA, CT, SINGER = range(4)
+
+
+class Belief(NamedTuple):
+    """What confirmed tracks believe beyond their moments; a row, the track's `slot`, for each.
+
+    The axes of what the filter in use does not need have length 0.
+    """
+
+    owner: NDArray[np.int64]  # (slots,) row of the track
+    particles: NDArray[np.float32]  # (slots, rows, N) offsets from the track's anchor, in its axes
+    weights: NDArray[np.float32]  # (slots, N)
+    model: NDArray[np.uint8]  # (slots, N) place of the particle's motion model in `par.model`
+    x: NDArray[np.float64]  # (slots, modes, n) Gaussian modes: e, n, v_e, v_n, then the model's own
+    P: NDArray[np.float64]  # (slots, modes, n, n)
+    mu: NDArray[np.float64]  # (slots, modes) probabilities
+    table: NDArray[np.float32]  # of normals, see `particle.normals`
+
 
 # The sweep's own counts, in an int64 array; `stage.Counts` gives them their names.
 C_STARTED, C_CONFIRMED, C_DELETED, C_LOST, C_FORCED, C_APPROXIMATE, C_EXTENDED, C_BLANKED, C_MERGED = range(9)

@@ -34,10 +34,18 @@ from radar_console.tracker.records import (
     PENDING,
     SIZES,
     STATE,
+    Belief,
 )
 from radar_console.tracker.sweep import sweep
 
+# In the order of their numbers in `records`.
+_FILTERS = ("kalman", "extended", "unscented", "imm", "particle")
+_PROPOSALS = ("prior", "optimal", "adapted")
+_RESAMPLINGS = ("systematic", "stratified", "residual", "multinomial")
+_MODELS = ("cv", "ca", "ct", "singer")
+
 _GRID = 2.0**20  # per s and per m: interpolated values are rounded, so that no cut shows in them
+_SD_HEIGHT = 30.0  # m, of a reported height
 _LOG = 2048  # sectors that are remembered, to find where the beam was
 _FEW_TURNS = 4
 
@@ -87,16 +95,13 @@ class Tracker:
     def __init__(self, settings: TrackerSettings, radar: Radar, seed: int) -> None:
         self.settings, self.radar, self.counts = settings, radar, Counts()
         self._par = _parameters(settings, radar, seed)[0]
-        self._table = normals()
         self._clutter = clutter.empty_map()
         self._size, self._need = np.zeros(SIZES, np.int64), np.zeros(SIZES, np.int64)
         self._swept = np.zeros(COUNTS, np.int64)
         self._tracks = np.zeros(64, STATE)
         self._pool, self._edges = np.zeros(64, PENDING), np.zeros(256, EDGE)
         self._rows = np.zeros(256, TRACK)
-        self._particles = np.zeros((16, 4, settings.particles), np.float32)
-        self._weights = np.zeros((16, settings.particles), np.float32)
-        self._owner = np.zeros(16, np.int64)
+        self._belief = _empty_belief(settings)
         self._blank = np.zeros(settings.bins, np.bool_)
         self._queue = np.zeros(0, PENDING)
         self._log = _BeamLog()
@@ -174,7 +179,11 @@ class Tracker:
         z = from_polar(plots["range"], azimuth, plots["sd_range"], plots["sd_azimuth"])
         plots["e"], plots["n"] = z.mean[:, 0] + east, z.mean[:, 1] + north
         plots["ee"], plots["en"], plots["nn"] = z.cov[:, 0, 0], z.cov[:, 0, 1], z.cov[:, 1, 1]
-        plots["t"], plots["ordinal"], plots["mode_3a"] = table["time"], table["ordinal"], table["mode_3a"]
+        plots["s_e"], plots["s_n"] = east, north
+        plots["up"], plots["uu"] = table["height"], _SD_HEIGHT**2
+        plots["doppler"], plots["sd_doppler"] = table["doppler"], table["sd_doppler"]
+        plots["t"], plots["ordinal"] = table["time"], table["ordinal"]
+        plots["mode_3a"], plots["address"] = table["mode_3a"], table["address"]
         plots["extended"] = table["flags"] & np.uint32(CentroidFlag.EXTENDED) != 0
         plots["weight"] = 1.0
         return plots
@@ -212,9 +221,8 @@ class Tracker:
         done = 0
         while done < len(beams):
             done += sweep(
-                beams[done:], self._par, self._table, self._clutter[0], self._queue, self._tracks, self._pool,
-                self._edges, self._particles, self._weights, self._owner, self._blank, self._rows, self._size,
-                self._need, self._swept, final,
+                beams[done:], self._par, self._clutter[0], self._queue, self._tracks, self._pool, self._edges,
+                self._belief, self._blank, self._rows, self._size, self._need, self._swept, final,
             )  # fmt: skip
             rows.append(self._rows[: self._size[N_ROWS]].copy())
             self._size[N_ROWS] = 0
@@ -230,9 +238,9 @@ class Tracker:
         need = self._need
         self._tracks, self._pool = _longer(self._tracks, need[N_TRACKS]), _longer(self._pool, need[N_POOL])
         self._rows, self._edges = _longer(self._rows, need[N_ROWS]), _longer(self._edges, need[N_EDGES])
-        self._particles = _longer(self._particles, need[N_SLOTS])
-        self._weights = _longer(self._weights, need[N_SLOTS])
-        self._owner = _longer(self._owner, need[N_SLOTS])
+        belief = self._belief
+        slots = {name: _longer(getattr(belief, name), need[N_SLOTS]) for name in Belief._fields[:-1]}
+        self._belief = belief._replace(**slots)
 
 
 class _BeamLog:
@@ -304,6 +312,8 @@ def _parameters(settings: TrackerSettings, radar: Radar, seed: int) -> NDArray[n
     """The settings as the compiled sweep reads them, in SI."""
     par = np.zeros(1, PARAMETERS)
     density = settings.clutter_per_km2
+    models = settings.models or (("cv", "ct") if settings.filter == "imm" else ("cv",))
+    switching = len(models) > 1
     values = {
         "seed": seed,
         "p_d": settings.p_d,
@@ -323,10 +333,40 @@ def _parameters(settings: TrackerSettings, radar: Radar, seed: int) -> NDArray[n
         "max_range": radar.max_range,
         "sd_range": radar.sd_range,
         "sd_azimuth": radar.sd_azimuth,
+        "turn": radar.rotation,
+        "filter": _FILTERS.index(settings.filter),
+        "proposal": _PROPOSALS.index(settings.proposal),
+        "resampling": _RESAMPLINGS.index(settings.resampling),
+        "gaussian": settings.likelihood == "gaussian",
+        "use_doppler": settings.doppler == "use",
+        "models": len(models),
+        "manoeuvre": settings.manoeuvre_mps2,
+        "manoeuvre_time": settings.manoeuvre_s,
+        "turn_rate": math.radians(settings.turn_rate_dps),
     }
+    # The first model is that of undisturbed flight.
+    for k, model in enumerate(models):
+        par[0]["model"][k] = _MODELS.index(model)
+        stay = settings.manoeuvre_s if k else settings.straight_s
+        par[0]["leave"][k] = 1.0 / stay if switching else 0.0
     for name, value in values.items():
         par[0][name] = value
     return par
+
+
+def _empty_belief(settings: TrackerSettings) -> Belief:
+    """Room for a few tracks of the filter in use."""
+    slots, count = 16, settings.particles if settings.filter == "particle" else 0
+    return Belief(
+        np.zeros(slots, np.int64),
+        np.zeros((slots, 4, count), np.float32),
+        np.zeros((slots, count), np.float32),
+        np.zeros((slots, count), np.uint8),
+        np.zeros((slots, 0, 0)),
+        np.zeros((slots, 0, 0, 0)),
+        np.zeros((slots, 0)),
+        normals(),
+    )
 
 
 def _longer(table: Any, count: int) -> Any:

@@ -17,8 +17,7 @@ from radar_console.core.messages import TrackStatus
 from radar_console.estimation import particle
 from radar_console.estimation.gaussian import Array
 from radar_console.estimation.kalman import predict_in_place, update_in_place
-from radar_console.estimation.particle import Singles
-from radar_console.tracker import cloud, clutter, gating, management
+from radar_console.tracker import clutter, filters, gating, management
 from radar_console.tracker.association import jpda
 from radar_console.tracker.records import (
     C_APPROXIMATE,
@@ -35,13 +34,14 @@ from radar_console.tracker.records import (
     N_TRACKS,
     STARTER,
     TENTATIVE,
+    Belief,
 )
 
 _BROAD = particle.BROAD
 _find, _solve, _BUDGET = jpda.find, jpda.solve, jpda.BUDGET
 _look, _density, _density_of, _MARGIN = gating.look, gating.density, gating.density_of, gating.MARGIN
 _estimate, _turn_to, _place = clutter.estimate, clutter.turn_to, clutter.place
-_start, _advance, _log_likelihood, _update = cloud.start, cloud.advance, cloud.log_likelihood, cloud.update
+_advance, _log_likelihood, _update = filters.advance, filters.log_likelihood, filters.update
 _serve, _remove, _begin, _report = management.serve, management.remove, management.begin, management.report
 _DELETED = int(TrackStatus.DELETED)
 
@@ -54,15 +54,12 @@ _NOBODY = -2  # mark of a plot that no track claims
 def sweep(
     beams: Any,
     par: Any,
-    table: Singles,
     clutter_map: Any,
     queue: Any,
     tracks: Any,
     pool: Any,
     edges: Any,
-    particles: Singles,
-    weights: Singles,
-    owner: Any,
+    belief: Belief,
     blank: Any,
     rows: Any,
     size: Any,
@@ -92,7 +89,7 @@ def sweep(
             or need[N_EDGES] > edges.size
             or need[N_TRACKS] > tracks.size
             or need[N_ROWS] > rows.size
-            or need[N_SLOTS] > owner.size
+            or need[N_SLOTS] > belief.owner.size
         ):
             return b
         cell = math.floor(beam.phi / par.bin - 0.5)
@@ -104,13 +101,11 @@ def sweep(
         _link(opened, tracks, edges, size)
         for level in (CONFIRMED, TENTATIVE, STARTER):
             _close(
-                level, beam, par, table, clutter_map, tracks, opened, pool, edges, particles, weights,
-                owner, blank, rows, size, count, final,
+                level, beam, par, clutter_map, tracks, opened, pool, edges, belief, blank, rows, size,
+                count, final,
             )  # fmt: skip
         _merge(par, tracks, opened, pool, rows, size, count)
-        _tidy(
-            beam, par, clutter_map, tracks, opened, pool, edges, particles, weights, owner, rows, size, count
-        )
+        _tidy(beam, par, clutter_map, tracks, opened, pool, edges, belief, rows, size, count)
         _turn_to(clutter_map, beam.phi)
     return int(beams.size)
 
@@ -171,9 +166,8 @@ def _link(opened: Any, tracks: Any, edges: Any, size: Any) -> None:
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def _close(
-    level: int, beam: Any, par: Any, table: Singles, clutter_map: Any, tracks: Any, opened: Any, pool: Any,
-    edges: Any, particles: Singles, weights: Singles, owner: Any, blank: Any, rows: Any, size: Any,
-    count: Any, final: bool,
+    level: int, beam: Any, par: Any, clutter_map: Any, tracks: Any, opened: Any, pool: Any, edges: Any,
+    belief: Belief, blank: Any, rows: Any, size: Any, count: Any, final: bool,
 ) -> None:  # fmt: skip
     """Serve the clusters of one level that are complete, or have waited too long."""
     n = opened.size
@@ -222,11 +216,11 @@ def _close(
         if not complete[root]:
             count[C_FORCED] += 1
         if level == STARTER:
-            _settle_starter(members[0], beam, par, table, tracks, pool, edges, particles, weights, owner,
-                            blank, rows, size, count, clutter_map)  # fmt: skip
+            _settle_starter(members[0], beam, par, tracks, pool, edges, belief, blank, rows, size, count,
+                            clutter_map)  # fmt: skip
         else:
-            _settle(level, members[:m], beam, par, table, tracks, pool, edges, particles, weights, owner,
-                    blank, rows, size, count, clutter_map)  # fmt: skip
+            _settle(level, members[:m], beam, par, tracks, pool, edges, belief, blank, rows, size, count,
+                    clutter_map)  # fmt: skip
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -242,9 +236,8 @@ def _false_density(track: Any, beam: Any, par: Any, clutter_map: Any) -> float:
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def _settle(
-    level: int, members: Any, beam: Any, par: Any, table: Singles, tracks: Any, pool: Any, edges: Any,
-    particles: Singles, weights: Singles, owner: Any, blank: Any, rows: Any, size: Any, count: Any,
-    clutter_map: Any,
+    level: int, members: Any, beam: Any, par: Any, tracks: Any, pool: Any, edges: Any, belief: Belief,
+    blank: Any, rows: Any, size: Any, count: Any, clutter_map: Any,
 ) -> None:  # fmt: skip
     """Solve a cluster's association, and update its swept members."""
     m, pairs, plots = members.size, 0, 0
@@ -259,14 +252,14 @@ def _settle(
     plot_of, total = np.empty(pairs, np.int64), np.empty(pairs)
     first = np.zeros(m + 1, np.int64)
     clouds = level == CONFIRMED
-    relative = np.empty((pairs if clouds else 0, particles.shape[2]), np.float32)
+    relative = np.empty((pairs if clouds else 0, belief.particles.shape[2]), np.float32)
     n = 0
     for i in range(m):
         track = tracks[members[i]]
         sampled = clouds and track.swept and track.first >= 0
         if sampled:
             t = max(_mean_time(track, pool, edges), track.t)
-            _advance_both(track, t, par, particles[track.slot], table)
+            _advance(track, t, par, belief)
         scale = par.p_d / _false_density(track, beam, par, clutter_map)
         k = track.first
         while k >= 0:
@@ -275,9 +268,7 @@ def _settle(
             if plot.weight > 0.0 and (clouds or not plot.awaited):
                 likelihood, sum_relative = edges[k].density, 1.0
                 if sampled:
-                    log_g, sum_relative = _log_likelihood(
-                        track, plot, par.outliers, particles[track.slot], weights[track.slot], relative[n]
-                    )
+                    log_g, sum_relative = _log_likelihood(track, plot, par, belief, relative[n])
                     likelihood = math.exp(log_g)
                 weight = scale * likelihood * plot.weight
                 if weight > _PRUNE * miss[i]:
@@ -313,16 +304,15 @@ def _settle(
         if hi > lo:
             if clouds:
                 _update(track, max(1.0 - used, 0.0), beta[lo:hi], total[lo:hi], relative[lo:hi],
-                        par.resample_below, particles[track.slot], weights[track.slot], par.seed,
-                        table)  # fmt: skip
+                        plot_of[lo:hi], pool, par, belief)  # fmt: skip
             else:
                 _update_tentative(track, beta[lo:hi], plot_of[lo:hi], pool, par)
         if best >= 0:
             _serve(track, members[i], used >= 0.5, True, pool[plot_of[best]], beta[best], rough[i], beam, par,
-                   table, particles, weights, owner, blank, rows, size, count)  # fmt: skip
+                   belief, blank, rows, size, count)  # fmt: skip
         else:
             _serve(track, members[i], False, False, pool[0], math.nan, rough[i], beam, par,
-                   table, particles, weights, owner, blank, rows, size, count)  # fmt: skip
+                   belief, blank, rows, size, count)  # fmt: skip
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -336,13 +326,6 @@ def _mean_time(track: Any, pool: Any, edges: Any) -> float:
         k = edges[k].next
     mean: float = origin + t / total
     return mean
-
-
-@njit(cache=True, nogil=True, error_model="numpy")
-def _advance_both(track: Any, t: float, par: Any, particles: Singles, table: Singles) -> None:
-    """Predict the moments and the particles to the same time."""
-    predict_in_place(track.x, track.P, t - track.t, par.q)
-    _advance(track, t, par.q, particles, par.seed, table)
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -387,9 +370,8 @@ def _update_tentative(track: Any, beta: Array, plot_of: Any, pool: Any, par: Any
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def _settle_starter(
-    index: int, beam: Any, par: Any, table: Singles, tracks: Any, pool: Any, edges: Any,
-    particles: Singles, weights: Singles, owner: Any, blank: Any, rows: Any, size: Any, count: Any,
-    clutter_map: Any,
+    index: int, beam: Any, par: Any, tracks: Any, pool: Any, edges: Any, belief: Belief, blank: Any,
+    rows: Any, size: Any, count: Any, clutter_map: Any,
 ) -> None:  # fmt: skip
     """The second plot is the likeliest one; a mean of several would give no velocity.
 
@@ -406,13 +388,13 @@ def _settle_starter(
     if best < 0:
         track.score += math.log(miss)
         _serve(track, index, False, False, pool[0], math.nan, False, beam, par,
-               table, particles, weights, owner, blank, rows, size, count)  # fmt: skip
+               belief, blank, rows, size, count)  # fmt: skip
         return
     track.score += math.log(miss + par.p_d * value / _false_density(track, beam, par, clutter_map))
     _update_tentative(track, np.ones(1), np.full(1, best), pool, par)
     track.level = TENTATIVE
     _serve(track, index, True, True, pool[best], 1.0, False, beam, par,
-           table, particles, weights, owner, blank, rows, size, count)  # fmt: skip
+           belief, blank, rows, size, count)  # fmt: skip
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -443,7 +425,7 @@ def _merge(par: Any, tracks: Any, opened: Any, pool: Any, rows: Any, size: Any, 
 @njit(cache=True, nogil=True, error_model="numpy")
 def _tidy(
     beam: Any, par: Any, clutter_map: Any, tracks: Any, opened: Any, pool: Any, edges: Any,
-    particles: Singles, weights: Singles, owner: Any, rows: Any, size: Any, count: Any,
+    belief: Belief, rows: Any, size: Any, count: Any,
 ) -> None:  # fmt: skip
     """Drop the edges of what was served; plots without a claimant start tracks or go; bury the dead."""
     for p in range(size[N_POOL]):
@@ -481,7 +463,7 @@ def _tidy(
     for k in range(size[N_EDGES]):
         edges[k].plot = moved[edges[k].plot]
     for k in range(buried - 1, -1, -1):
-        _remove(dead[k], tracks, edges, particles, weights, owner, size)
+        _remove(dead[k], tracks, edges, belief, size)
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
