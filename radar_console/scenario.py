@@ -317,7 +317,7 @@ class TrackerSettings(Settings):
     turn_rate_dps: Annotated[Positive, Field(description="rms rate of a turn")] = 3.0
     max_tracks: Annotated[
         Count, Field(description="capacity, young tracks included; the least likely young ones go first")
-    ] = 20_000
+    ] = 50_000
     particles: Annotated[int, Field(ge=10, le=100_000)] = 1000
     resample_below: Annotated[
         Probability, Field(description="resample when N_eff < this part of the particles")

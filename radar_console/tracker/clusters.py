@@ -27,12 +27,11 @@ from radar_console.tracker.records import (
 
 _find, _solve, _BUDGET = jpda.find, jpda.solve, jpda.BUDGET
 _advance, _log_likelihood, _update = filters.advance, filters.log_likelihood, filters.update
-_estimate, _predicted, _MARGIN = clutter.estimate, gating.predicted, gating.MARGIN
+_false_density, _MARGIN = clutter.false_density, gating.MARGIN
 _height_factor, _update_height, _identity_factor = height.factor, height.update, identity.factor
 _serve = management.serve
 
 _PRUNE = 1e-3  # of the miss: a pair that is less likely is no pair
-_LEAST_DENSITY = 1e-15  # m⁻²
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -134,15 +133,6 @@ def _mean_time(track: Any, pool: Any, edges: Any) -> float:
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def false_density(track: Any, beam: Any, w: World) -> float:
-    """λ, m⁻², where the track is."""
-    if not math.isnan(w.par.clutter):
-        return max(float(w.par.clutter), _LEAST_DENSITY)
-    e, n, _, _, _ = _predicted(track, max(beam.t - track.t, 0.0))
-    return max(_estimate(w.clutter, e - beam.e, n - beam.n, w.par.max_range), _LEAST_DENSITY)
-
-
-@njit(cache=True, nogil=True, error_model="numpy")
 def evidence(track: Any, plot: Any, par: Any) -> float:
     """What a plot says besides its position: likelihood ratio of its height and its identity."""
     ratio = 1.0
@@ -154,19 +144,19 @@ def evidence(track: Any, plot: Any, par: Any) -> float:
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def associate(beam: Any, w: World) -> None:
+def associate(w: World) -> None:
     """Find the probability of every pair, cluster by cluster, and use the plots up."""
     lo, stop = 0, w.size[N_MEMBERS]
     while lo < stop:
         hi = lo + 1
         while hi < stop and w.members[hi].cluster == w.members[lo].cluster:
             hi += 1
-        _associate(lo, hi, beam, w)
+        _associate(lo, hi, w)
         lo = hi
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _associate(lo: int, hi: int, beam: Any, w: World) -> None:
+def _associate(lo: int, hi: int, w: World) -> None:
     tracks, pool, par = w.tracks, w.pool, w.par
     begin = w.members[lo].pairs
     end = w.members[hi].pairs if hi < w.size[N_MEMBERS] else w.size[N_PAIRS]
@@ -180,12 +170,11 @@ def _associate(lo: int, hi: int, beam: Any, w: World) -> None:
     for i in range(m):
         member = w.members[lo + i]
         track = tracks[member.track]
-        scale = par.p_d / false_density(track, beam, w)
         until = w.members[lo + i + 1].pairs if lo + i + 1 < w.size[N_MEMBERS] else w.size[N_PAIRS]
         for k in range(member.pairs, until):
             pair = w.pairs[k]
             plot = pool[pair.plot]
-            pair.w *= scale * plot.weight * evidence(track, plot, par)
+            pair.w *= par.p_d / _false_density(plot, 0.0, par) * plot.weight * evidence(track, plot, par)
             if pair.w > _PRUNE * miss[i]:
                 if plot.mark < 0:
                     plot.mark = plots

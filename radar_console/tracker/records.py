@@ -82,9 +82,16 @@ PENDING = np.dtype(
         ("awaited", "?"),  # an open confirmed track claims it
         ("mark", "i8"),  # scratch: first claimant, or column of a cluster
         ("head", "i8"),  # scratch: first of its edges
+        ("near", "f8"),  # centroids around it in the last turns, less what confirmed tracks used
+        ("exposure", "f8"),  # m² and turn, where they were counted
+        ("base", "f8"),  # m⁻², density of false centroids by the map
+        ("past", "i8"),  # its row among the past centroids
     ]
 )
 """A centroid that waits for its bin, or for the tracks that claim it."""
+
+PAST = np.dtype([("phi", "f8"), ("e", "f8"), ("n", "f8"), ("weight", "f8")])
+"""A centroid of the last turns."""
 
 EDGE = np.dtype(
     [
@@ -213,8 +220,10 @@ SWEPT_COUNTS = (
 ) = range(len(SWEPT_COUNTS))
 
 # How much of each table is in use, in an int64 array.
-N_TRACKS, N_POOL, N_EDGES, N_SLOTS, N_ROWS, N_QUEUE, N_OPEN, N_MEMBERS, N_PAIRS, N_DEAD, N_PHASE = range(11)
-SIZES = 11
+N_TRACKS, N_POOL, N_EDGES, N_SLOTS, N_ROWS, N_QUEUE, N_OPEN, N_MEMBERS, N_PAIRS, N_DEAD, N_PHASE, N_PAST = (
+    range(12)
+)
+SIZES = 12
 
 
 class World(NamedTuple):
@@ -227,6 +236,7 @@ class World(NamedTuple):
     opened: NDArray[np.int64]  # (tracks,) the rows whose gates the beam has reached
     dead: NDArray[np.int64]  # (tracks,) the rows to be buried at the bin's end
     pool: Any  # PENDING table
+    past: Any  # PAST table
     edges: Any  # EDGE table
     members: Any  # MEMBER table
     pairs: Any  # PAIR table

@@ -31,6 +31,7 @@ from radar_console.tracker.records import (
     N_EDGES,
     N_MEMBERS,
     N_PAIRS,
+    N_PAST,
     N_POOL,
     N_QUEUE,
     N_ROWS,
@@ -38,6 +39,7 @@ from radar_console.tracker.records import (
     N_TRACKS,
     PAIR,
     PARAMETERS,
+    PAST,
     PENDING,
     SIZES,
     STATE,
@@ -127,6 +129,7 @@ class Tracker:
         self._log.append(sector)
         if self._next_bin is None:
             self._next_bin = math.floor(self._log.angle[0] / self._bin) + 1
+            self._world.clutter["first"] = self._log.angle[0]
             self._world.clutter["last"] = math.floor(self._log.angle[0] / TURN * clutter.COLUMNS)
         self._skip_long_gap()
         if len(sector.centroids):
@@ -246,7 +249,7 @@ class Tracker:
                 return b
             if world.size[N_MEMBERS]:
                 self._share(weigh)
-                associate(beams[b], world)
+                associate(world)
                 self._share(step)
             close_bin(beams[b], world, final)
         return len(beams)
@@ -402,6 +405,7 @@ def _empty_world(settings: TrackerSettings, radar: Radar, seed: int) -> World:
         opened=np.zeros(64, np.int64),
         dead=np.zeros(64, np.int64),
         pool=np.zeros(64, PENDING),
+        past=np.zeros(256, PAST),
         edges=np.zeros(256, EDGE),
         members=np.zeros(64, MEMBER),
         pairs=np.zeros(64, PAIR),
@@ -421,6 +425,7 @@ _ROOM = {
     "opened": N_TRACKS,
     "dead": N_TRACKS,
     "pool": N_POOL,
+    "past": N_PAST,
     "edges": N_EDGES,
     "members": N_MEMBERS,
     "pairs": N_PAIRS,

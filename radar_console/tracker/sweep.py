@@ -18,6 +18,7 @@ from radar_console.tracker.records import (
     N_MEMBERS,
     N_OPEN,
     N_PAIRS,
+    N_PAST,
     N_PHASE,
     N_POOL,
     N_QUEUE,
@@ -36,6 +37,7 @@ _serve_members, _settle_young, _retire, _purge = (
     youth.purge,
 )
 _bury, _turn_to = management.bury, clutter.turn_to
+_survey, _remember, _forget = clutter.survey, clutter.remember, clutter.forget
 
 _OPENED = 1
 
@@ -52,7 +54,7 @@ def sweep(beams: Any, queue: Any, w: World, final: bool) -> int:
         members = w.size[N_MEMBERS]
         if members:
             _weigh(w, 0, members)
-            _associate(beams[b], w)
+            _associate(w)
             _step(w, 0, members)
         close_bin(beams[b], w, final)
     return int(beams.size)
@@ -89,6 +91,7 @@ def close_bin(beam: Any, w: World, final: bool) -> None:
     _purge(w)
     _bury(w)
     _turn_to(w.clutter, beam.phi)
+    _forget(beam.phi, w)
     w.size[N_PHASE] = 0
 
 
@@ -157,8 +160,10 @@ def _gate(beam: Any, queue: Any, w: World) -> bool:
     need[N_ROWS] = size[N_ROWS] + opened + 2 * (count + first + n) + _purged(need[N_TRACKS], par)
     need[N_SLOTS] = size[N_SLOTS] + opened
     need[N_MEMBERS] = opened
+    need[N_PAST] = size[N_PAST] + n
     if (
         count > edges.size
+        or need[N_PAST] > w.past.size
         or need[N_POOL] > w.pool.size
         or need[N_TRACKS] > w.tracks.size
         or need[N_ROWS] > w.rows.size
@@ -168,6 +173,9 @@ def _gate(beam: Any, queue: Any, w: World) -> bool:
         return False
     for k in range(n):
         w.pool[first + k] = fresh[k]
+        _survey(w.pool[first + k], beam, w)
+    for k in range(n):
+        _remember(w.pool[first + k], w)
     size[N_POOL], size[N_EDGES], size[N_QUEUE] = first + n, count, stop
     for place in range(opened):
         track = w.tracks[w.opened[place]]

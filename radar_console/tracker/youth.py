@@ -36,14 +36,16 @@ from radar_console.tracker.records import (
 )
 
 _BROAD = particle.BROAD
-_density_of, _MARGIN, _estimate, _place = gating.density_of, gating.MARGIN, clutter.estimate, clutter.place
-_evidence, _false_density, _update_height = clusters.evidence, clusters.false_density, height.update
+_density_of, _MARGIN, _place = gating.density_of, gating.MARGIN, clutter.place
+_false_density, _own, _radius = clutter.false_density, clutter.own, clutter.radius
+_evidence, _update_height = clusters.evidence, height.update
 _serve, _begin, _kill, _report = management.serve, management.begin, management.kill, management.report
 _confirm = management.confirm
 _DELETED = int(TrackStatus.DELETED)
 _PRUNE = 1e-3  # of the miss: a pair that is less likely is no pair
 _NOBODY, _HELD = -2, -3  # marks of a plot: no track waits for it; some do
 _DENSE = 1.0  # false plots in the gate of a track's second plot, from which on clutter counts as dense
+_MOST_ENDS = 8  # branches that may end on one plot
 _PURGE = 0.95  # of the capacity is left when it was exceeded
 
 
@@ -90,13 +92,14 @@ def _settle_tentative(index: int, beam: Any, w: World) -> None:
         _serve(index, False, False, pool[0], math.nan, False, beam, w)
         return
     beta, chosen = np.empty(count), np.empty(count, np.int64)
-    scale = par.p_d / _false_density(track, beam, w)
+    own = _own(track, par)
     n, total, best, k = 0, miss, -1, track.first
     while k >= 0:
         plot = pool[edges[k].plot]
         # A plot that a confirmed track still waits for is left to it.
         if plot.weight > 0.0 and not plot.awaited:
-            weight = scale * edges[k].density * plot.weight * _evidence(track, plot, par)
+            weight = par.p_d / _false_density(plot, own, par) * edges[k].density
+            weight *= plot.weight * _evidence(track, plot, par)
             if weight > _PRUNE * miss:
                 beta[n], chosen[n] = weight, edges[k].plot
                 total += weight
@@ -154,23 +157,25 @@ def _settle_starter(index: int, beam: Any, w: World) -> None:
     """
     tracks, pool, edges, par = w.tracks, w.pool, w.edges, w.par
     track = tracks[index]
+    own = _own(track, par)
     best, value, k = -1, 0.0, track.first
     while k >= 0:
         plot = pool[edges[k].plot]
         if plot.weight >= 0.5 and not plot.awaited:
-            weight = edges[k].density * _evidence(track, plot, par)
+            weight = par.p_d / _false_density(plot, own, par) * edges[k].density
+            weight *= _evidence(track, plot, par)
             if weight > value:
                 best, value = k, weight
         k = edges[k].next
     miss = 1.0 - par.p_d * par.p_g
     if best >= 0:
-        scale = par.p_d / _false_density(track, beam, w)
-        _branch(index, best, scale * value, track.voiced, beam, w)
+        _branch(index, best, value, track.voiced, beam, w)
         k = track.first
         while k >= 0:
             plot = pool[edges[k].plot]
             if k != best and plot.weight >= 0.5 and not plot.awaited:
-                weight = scale * edges[k].density * _evidence(track, plot, par)
+                weight = par.p_d / _false_density(plot, own, par) * edges[k].density
+                weight *= _evidence(track, plot, par)
                 if weight > _PRUNE * miss:
                     _branch(index, k, weight, False, beam, w)
             k = edges[k].next
@@ -277,7 +282,25 @@ def _merge(plot: Any, beam: Any, w: World) -> bool:
             if same and _before(ends[j], stays, w):
                 stays = ends[j]
         _absorb(stays, ends[:n], True, w)
+    _keep_best(ends[:n], w)
     return False
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _keep_best(ends: Any, w: World) -> None:
+    """Of the tracks with three plots or more that end on one plot only the likeliest go on."""
+    score, index, n = np.empty(ends.size), np.empty(ends.size, np.int64), 0
+    for i in ends:
+        track = w.tracks[i]
+        if not track.dead and track.hits > 2:
+            score[n], index[n] = -track.score, i
+            n += 1
+    for k in np.argsort(score[:n], kind="mergesort")[_MOST_ENDS:]:
+        track = w.tracks[index[k]]
+        if track.voiced:
+            _report(track, _DELETED, False, False, w.pool[0], math.nan, False, track.t, w)
+            w.tally[C_MERGED] += 1
+        _kill(index[k], w)
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -321,12 +344,11 @@ def _start(plot: Any, free: bool, beam: Any, w: World) -> None:
     e, n = plot.e - beam.e, plot.n - beam.n
     ring, column = _place(e, n, par.max_range)
     w.clutter.fresh[ring, column] += plot.weight
+    w.past[plot.past].weight = plot.weight
     if free and plot.weight >= 0.5:
-        density = par.clutter
-        if math.isnan(density):
-            density = _estimate(w.clutter, e, n, par.max_range)
-        reach = par.max_speed * par.turn
-        _begin(plot, density * math.pi * reach * reach > _DENSE, w)
+        rho = _radius(math.hypot(e, n), par)
+        crowd = _false_density(plot, 0.0, par) * math.pi * rho * rho
+        _begin(plot, crowd > _DENSE, w)
         w.tally[C_STARTED] += 1
 
 
