@@ -109,13 +109,16 @@ def polar(
 
 
 def _norm(p: Array) -> Array:
-    result: Array = np.sqrt(np.sum(p * p, axis=-1))
+    return np.sqrt(_dot(p, p))
+
+
+def _dot(p: Array, v: Array) -> Array:
+    result: Array = np.einsum("...i,...i->...", p, v)
     return result
 
 
 def _range_rate(p: Array, v: Array) -> Array:
-    result: Array = np.sum(p * v, axis=-1) / np.maximum(_norm(p), _NEAREST)
-    return result
+    return _dot(p, v) / np.maximum(_norm(p), _NEAREST)
 
 
 def _range_gradient(p: Array, v: Array) -> tuple[Array, Array]:
@@ -139,7 +142,7 @@ def _elevation_gradient(p: Array, v: Array) -> tuple[Array, Array]:
 def _doppler_gradient(p: Array, v: Array) -> tuple[Array, Array]:
     r = np.maximum(_norm(p), _NEAREST)[..., None]
     u = p / r
-    return (v - u * np.sum(u * v, axis=-1, keepdims=True)) / r, u * np.ones_like(v)
+    return (v - u * _dot(u, v)[..., None]) / r, u * np.ones_like(v)
 
 
 _Value = Callable[[Array, Array], Array]

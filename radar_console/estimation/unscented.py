@@ -1,6 +1,7 @@
 """The unscented Kalman filter [1]: the density is carried through the models by 2n + 1 points.
 
-The points are the first axis of their array, so that the models broadcast over them as over any other. Their
+The points are the first axis of their array, so that the models broadcast over them as over any other; a
+state needs all the leading axes that its models have. Their
 scaling keeps them one standard deviation times √n from the mean and all weights positive: covariances
 stay positive too, and nothing is lost by cancellation. Differences of measurements are taken from the
 central point's and wrapped there, so azimuths may lie on either side of north.
