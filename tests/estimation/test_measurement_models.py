@@ -105,6 +105,17 @@ def test_conversion_from_space_is_unbiased_and_its_covariance_is_its_own(elevati
     assert np.allclose(np.cov(white), np.eye(3), rtol=0, atol=0.01)
 
 
+def test_an_error_of_azimuth_alone_moves_the_point_level():
+    """The point stays on its circle of latitude: the errors along and above the line of sight are one."""
+    z = measurement.from_spherical(8e4, 5.5, 0.6, 0.0, 0.03, 0.0)
+    # Rounding of what is across the line of sight.
+    assert np.all(np.abs(z.cov[2]) < 1e-12 * np.trace(z.cov))
+    inward = np.array([np.sin(5.5), np.cos(5.5)])
+    assert inward @ z.cov[:2, :2] @ inward == pytest.approx(
+        0.5 * (8e4 * np.cos(0.6) * 0.03**2) ** 2, rel=1e-9
+    )
+
+
 def test_conversion_from_space_at_the_horizon_is_that_of_the_plane():
     space = measurement.from_spherical(5e4, 2.0, 0.0, 50.0, 0.01, 0.0)
     plane = measurement.from_polar(5e4, 2.0, 50.0, 0.01)

@@ -90,6 +90,14 @@ def test_the_turns_jacobian_is_its_derivative(axes, rate):
         assert np.allclose(model.jacobian(x)[:, column], expected, rtol=1e-6, atol=1e-6)
 
 
+def test_the_turns_jacobian_does_not_step_where_series_and_closed_form_meet():
+    """At 0.1 rad; the closed form cancels to some 1e-13 there, and 2e-12 of the angle lies between."""
+    below, above = ((1 - 1e-12) * 0.025, (1 + 1e-12) * 0.025)
+    for sign in (-1, 1):
+        columns = [model.jacobian(x)[:2, -1] for model, x in (turned(sign * rate) for rate in (below, above))]
+        assert np.allclose(columns[0], columns[1], rtol=1e-11, atol=0)
+
+
 def test_a_positive_rate_turns_right_on_a_circle():
     model, x = turned(np.pi / 8)  # a quarter turn in 4 s
     moved = model.f(x)
