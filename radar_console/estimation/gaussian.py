@@ -39,3 +39,25 @@ def log_density(nu: Array, S: Array) -> Array:
     d2 = np.sum(nu * np.linalg.solve(S, nu[..., None])[..., 0], axis=-1)
     log_density: Array = -0.5 * (d2 + np.linalg.slogdet(2 * np.pi * S).logabsdet)
     return log_density
+
+
+def apply(matrix: Array, vector: Array) -> Array:
+    """`matrix` (..., m, n) times `vector` (..., n), both with leading axes that broadcast: (..., m)."""
+    result: Array = vector @ matrix.T if matrix.ndim == 2 else (matrix @ vector[..., None])[..., 0]
+    return result
+
+
+def root(cov: Array) -> Array:
+    """A matrix L (..., n, n) with L Lᵀ = `cov`, also where `cov` is singular or nearly so.
+
+    It is Cholesky's factor where there is one, else the symmetric root of the nearest matrix without
+    negative eigenvalues. Each member of a stack is treated as if it were alone.
+    """
+    try:
+        return np.linalg.cholesky(cov)
+    except np.linalg.LinAlgError:
+        if cov.ndim > 2:
+            return np.stack([root(part) for part in cov])
+    values, vectors = np.linalg.eigh(cov)
+    result: Array = (vectors * np.sqrt(np.maximum(values, 0.0))) @ vectors.T
+    return result
