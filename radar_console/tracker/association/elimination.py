@@ -72,6 +72,9 @@ def plan(members: Ints, rows: Side, columns: Side, ceiling: float, work: Work) -
         degree = rows.start[i + 1] - rows.start[i]
         if first < 0 or degree < fewest:
             first, fewest = i, degree
+    if fewest > WIDEST:
+        return math.inf, 0
+    for i in members:
         for k in range(rows.start[i], rows.start[i + 1]):
             c = rows.other[k]
             left[c] = columns.start[c + 1] - columns.start[c]

@@ -49,8 +49,9 @@ def ratios(miss: Array, row: Ints, w: Array) -> Array:
             ratio[begin:end] = 0.0
             continue
         least = max(miss[track] / largest, LEAST_MISS)
-        for k in range(begin, end):
-            ratio[k] = w[k] / largest / least  # two quotients: no overflow, no 0 / 0 below 1e-308
+        gate, r = w[begin:end], ratio[begin:end]
+        for k in range(r.size):
+            r[k] = gate[k] / largest / least  # two quotients: no overflow, no 0 / 0 below 1e-308
     return ratio
 
 

@@ -11,36 +11,56 @@ from radar_console.estimation.gaussian import Array
 from radar_console.tracker.association.pairs import Ints, Side
 
 CLOSE = 1e-9
-"""Change of a message below which it has converged."""
+"""Relative change of what the plots hear below which the messages have converged."""
+
+
+# Sums in any order, so that they run in vectors.
+@njit(cache=True, nogil=True, error_model="numpy", fastmath={"reassoc", "nsz"})
+def propagate(members: Ints, tracks: Side, plots: int, sweeps: int, p: Array) -> bool:
+    """Fill `p` (pairs,) for the tracks `members`; False if `sweeps` sweeps were too few to converge.
+
+    A track tells a plot ratio / (1 + the sum over its other plots of ratio · message), a plot tells a
+    track 1 / (1 + the sum over its other tracks of message). Only what the tracks told is kept: what a
+    plot tells follows from that and from all that the plot has heard.
+    """
+    told, heard, hears = np.zeros(p.size), np.ones(plots), np.empty(plots)
+    widest = 0
+    for t in members:
+        widest = max(widest, tracks.start[t + 1] - tracks.start[t])
+    weight = np.empty(widest)
+    converged = False
+    for _ in range(sweeps):
+        hears[:] = 1.0
+        for t in members:
+            begin, end = tracks.start[t], tracks.start[t + 1]
+            r, c, u = tracks.ratio[begin:end], tracks.other[begin:end], told[begin:end]
+            total = _weigh(r, c, u, heard, weight)
+            for k in range(r.size):
+                # What is left without this pair; never below the miss's 1, whatever rounding does.
+                u[k] = r[k] / max(total - weight[k], 1.0)
+            for k in range(r.size):
+                hears[c[k]] += u[k]
+        change = 0.0
+        for j in range(plots):
+            change += abs(hears[j] - heard[j]) / hears[j]
+        heard, hears = hears, heard
+        if change < CLOSE:
+            converged = True
+            break
+    for t in members:
+        begin, end = tracks.start[t], tracks.start[t + 1]
+        r, c, u = tracks.ratio[begin:end], tracks.other[begin:end], told[begin:end]
+        total = _weigh(r, c, u, heard, weight)
+        for k in range(r.size):
+            p[begin + k] = weight[k] / total
+    return converged
 
 
 @njit(cache=True, nogil=True, error_model="numpy", fastmath={"reassoc", "nsz"})
-def propagate(members: Ints, tracks: Side, plots: int, sweeps: int, p: Array) -> None:
-    """Fill `p` (pairs,) for the tracks `members`, after `sweeps` sweeps at most."""
-    start, other, r = tracks
-    to_track, to_plot, heard = np.ones(p.size), np.empty(p.size), np.empty(plots)
-    for _ in range(sweeps):
-        heard[:] = 1.0
-        for i in members:
-            total = 1.0
-            for k in range(start[i], start[i + 1]):
-                total += r[k] * to_track[k]
-            for k in range(start[i], start[i + 1]):
-                # What is left without this pair; never below the miss's 1, whatever rounding does.
-                to_plot[k] = r[k] / max(total - r[k] * to_track[k], 1.0)
-            for k in range(start[i], start[i + 1]):
-                heard[other[k]] += to_plot[k]
-        change = 0.0
-        for i in members:
-            for k in range(start[i], start[i + 1]):
-                message = 1.0 / max(heard[other[k]] - to_plot[k], 1.0)
-                change = max(change, abs(message - to_track[k]))
-                to_track[k] = message
-        if change < CLOSE:
-            break
-    for i in members:
-        total = 1.0
-        for k in range(start[i], start[i + 1]):
-            total += r[k] * to_track[k]
-        for k in range(start[i], start[i + 1]):
-            p[k] = r[k] * to_track[k] / total
+def _weigh(r: Array, c: Ints, u: Array, heard: Array, weight: Array) -> float:
+    """Fill `weight` of a track's pairs, ratio times the plot's message; their sum with the miss's 1."""
+    total = 1.0
+    for k in range(r.size):
+        weight[k] = r[k] / max(heard[c[k]] - u[k], 1.0)
+        total += weight[k]
+    return total
