@@ -79,8 +79,8 @@ def test_order_of_tracks_and_plots_does_not_matter(kind, problem):
 @given(a=problems(4, 4), b=problems(4, 4))
 def test_clusters_are_independent(kind, a, b):
     a, b = a[0], b[0]
-    (m, n), (k, l) = a.shape, b.shape
-    both = np.zeros((m + k, n + l - 1))
+    (m, n), (k, more) = a.shape, b.shape
+    both = np.zeros((m + k, n + more - 1))
     both[:m, :n], both[m:, 0], both[m:, n:] = a, b[:, 0], b[:, 1:]
     found = solved(kind, both)
     assert np.abs(found[:m, :n] - solved(kind, a)).max() <= ROUNDING

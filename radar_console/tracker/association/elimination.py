@@ -151,8 +151,8 @@ def _lay_out(rows_count: int, rows: Side, columns: Side, work: Work) -> int:
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def eliminate(rows_count: int, rows: Side, columns: Side, work: Work, store: Array, p: Array) -> None:
-    """Fill `p` (pairs,) for the rows of `work.order`; `store` is as large as `plan` said."""
+def eliminate(rows_count: int, rows: Side, columns: Side, work: Work, store: Array) -> None:
+    """Turn the ratios of the rows of `work.order` into probabilities; `store` is as large as `plan` said."""
     peak = _lay_out(rows_count, rows, columns, work)
     ahead, behind = store[: 1 << peak], store[1 << peak : 2 << peak]
     tables = store[2 << peak :]
@@ -188,10 +188,10 @@ def eliminate(rows_count: int, rows: Side, columns: Side, work: Work, store: Arr
         for s in range(size):
             behind[s] = ahead[s]
         for k in range(rows.start[i], rows.start[i + 1]):
-            p[k] = _give(now, size, work.spot[k], rows.ratio[k], ahead, behind)
+            rows.ratio[k] = _give(now, size, work.spot[k], rows.ratio[k], ahead, behind)
         total = _product(now, behind, size)
         for k in range(rows.start[i], rows.start[i + 1]):
-            p[k] /= total
+            rows.ratio[k] /= total
         scale = 1.0 / _total(behind, size)
         for s in range(size):
             behind[s] *= scale

@@ -53,7 +53,11 @@ def assign(tracks: int, columns: int, row: Ints, col: Ints, cost: Array) -> Ints
     reached, settled = np.empty(columns, np.int64), np.empty(columns, np.int64)
     for t in range(tracks):
         i, here, n, m = t, 0.0, 0, 0  # track being looked from, its distance; columns reached, settled
-        end, last, shortest = -1, -1, math.inf  # the best end so far: a free column, or (-1) track `last` misses
+        end, last, shortest = (
+            -1,
+            -1,
+            math.inf,
+        )  # the best end so far: a free column, or (-1) track `last` misses
         while True:
             if here - u[i] < shortest:
                 shortest, end, last = here - u[i], -1, i

@@ -19,11 +19,12 @@ from radar_console.estimation.gaussian import Array
 from radar_console.tracker.association import elimination, pairs, propagation
 from radar_console.tracker.association.pairs import Ints, Side
 
-BUDGET = 1.2e7
+BUDGET = 8.0e6
 """Steps of the exact sums of one call (about 1 ns each), beyond which clusters are approximated."""
 
 _SWEEPS = 200
 _MESSAGES = 2.0e6  # of a call's belief propagation, about 3 ns each
+_BLOCK = 64  # weights of a dense row that are looked at together; less than 256
 _CHEAP = 256.0  # steps for which it is not worth while to look for a cheaper way
 
 _ratios, find = pairs.ratios, pairs.find
@@ -33,7 +34,7 @@ _propagate = propagation.propagate
 
 
 class Marginals(NamedTuple):
-    """Probability of each pair (pairs,), of each track's miss (tracks,), and which tracks' are approximate."""
+    """Probability of each pair (pairs,) and of each track's miss (tracks,); whose are approximate."""
 
     p: Array
     p_miss: Array
@@ -103,49 +104,39 @@ def _sound(miss: Array, columns: int, row: Ints, col: Ints, w: Array) -> bool:
 def _dense(weights: Array, budget: float, result: Array) -> bool:
     """Fill `result`; False if a weight is not sound."""
     tracks, columns = weights.shape
-    room = 8 * tracks + 64
-    row, col, w = np.empty(room, np.int64), np.empty(room, np.int64), np.empty(room)
-    miss = np.empty(tracks)
-    n = 0
+    blocks = (columns - 1 + _BLOCK - 1) // _BLOCK
+    some, pairs = np.empty((tracks, blocks), np.uint8), 0
     for t in range(tracks):
         gate = weights[t, 1:]
+        for b in range(blocks):
+            block, count = gate[b * _BLOCK : (b + 1) * _BLOCK], 0
+            for j in range(block.size):  # without a branch: as fast as memory delivers
+                count += block[j] != 0.0
+            some[t, b] = count
+            pairs += count
+    row, col, w = np.empty(pairs, np.int64), np.empty(pairs, np.int64), np.empty(pairs)
+    miss, n = np.empty(tracks), 0
+    for t in range(tracks):
         miss[t] = weights[t, 0]
         if not 0.0 <= miss[t] < math.inf:
             return False
-        for begin in range(0, columns - 1, _BLOCK):
-            block = gate[begin : begin + _BLOCK]
-            some = 0
-            for j in range(block.size):  # without a branch: as fast as memory delivers
-                some += block[j] != 0.0
-            if some == 0:
+        for b in range(blocks):
+            if some[t, b] == 0:
                 continue
-            if n + some > room:
-                room = 2 * room + some
-                row, col, w = _longer(row, room), _longer(col, room), _longer(w, room)
+            block = weights[t, 1 + b * _BLOCK : 1 + (b + 1) * _BLOCK]
             for j in range(block.size):
                 if block[j] != 0.0:
                     if not 0.0 < block[j] < math.inf:
                         return False
-                    row[n], col[n], w[n] = t, begin + j, block[j]
+                    row[n], col[n], w[n] = t, b * _BLOCK + j, block[j]
                     n += 1
     p, p_miss, approximate = np.empty(n), np.empty(tracks), np.zeros(tracks, np.bool_)
-    solve(miss, columns - 1, row[:n], col[:n], w[:n], budget, p, p_miss, approximate)
+    solve(miss, columns - 1, row, col, w, budget, p, p_miss, approximate)
     for t in range(tracks):
         result[t, 0] = p_miss[t]
     for k in range(n):
         result[row[k], col[k] + 1] = p[k]
     return True
-
-
-_BLOCK = 64
-
-
-@njit(cache=True, nogil=True)
-def _longer(a: Any, room: int) -> Any:
-    b = np.empty(room, a.dtype)
-    b[: a.size] = a
-    return b
-
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -171,29 +162,30 @@ def solve(
     claims = np.zeros(columns, np.int64)
     for k in range(row.size):
         claims[col[k]] += 1
-    by_track, free, shared = _shared(tracks, row, col, ratio, claims)
-    q = np.empty(shared.size)
-    _clusters(by_track, claims, budget, q, approximate)
-    for m in range(shared.size):
-        p[shared[m]] = q[m]
-    k = 0
+    by_track, free = _shared(tracks, row, col, ratio, claims, p)
+    _clusters(by_track, claims, budget, approximate)
+    n, k = 0, 0
     for t in range(tracks):
         rest = 1.0
         for m in range(by_track.start[t], by_track.start[t + 1]):
-            rest -= q[m]
+            rest -= by_track.ratio[m]
         rest = max(rest, 0.0) / free[t]  # of the track's miss; its own plots take their shares of it
         p_miss[t] = rest
         while k < row.size and row[k] == t:
             if claims[col[k]] == 1:
-                p[k] = rest * ratio[k]
+                p[k] *= rest
+            else:
+                p[k] = by_track.ratio[n]
+                n += 1
             k += 1
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _shared(tracks: int, row: Ints, col: Ints, ratio: Array, claims: Ints) -> tuple[Side, Array, Ints]:
-    """The pairs whose plot several tracks gate, over each track's miss and own plots.
+def _shared(tracks: int, row: Ints, col: Ints, ratio: Array, claims: Ints, own: Array) -> tuple[Side, Array]:
+    """The pairs whose plot several tracks gate, their ratios to a track's miss and own plots together.
 
-    Returns them by track, the weight `free` (tracks,) of the miss and own plots, and the pairs' places.
+    Moves them to the front of `ratio`, and copies the others to their places in `own`: on large problems
+    fresh memory costs more than the sums. Also returns that weight `free` (tracks,) of miss and own plots.
     """
     free = np.ones(tracks)
     count = 0
@@ -202,17 +194,18 @@ def _shared(tracks: int, row: Ints, col: Ints, ratio: Array, claims: Ints) -> tu
             free[row[k]] += ratio[k]
         else:
             count += 1
-    start, place = np.zeros(tracks + 1, np.int64), np.empty(count, np.int64)
-    other, r = np.empty(count, np.int64), np.empty(count)
+    start, other = np.zeros(tracks + 1, np.int64), np.empty(count, np.int64)
     n, k = 0, 0
     for t in range(tracks):
         while k < row.size and row[k] == t:
-            if claims[col[k]] > 1:
-                place[n], other[n], r[n] = k, col[k], ratio[k] / free[t]
+            if claims[col[k]] == 1:
+                own[k] = ratio[k]
+            else:
+                other[n], ratio[n] = col[k], ratio[k] / free[t]
                 n += 1
             k += 1
         start[t + 1] = n
-    return Side(start, other, r), free, place
+    return Side(start, other, ratio[:count]), free
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -266,8 +259,8 @@ def _components(by_track: Side, columns: int) -> tuple[Ints, Ints]:
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _clusters(by_track: Side, claims: Ints, budget: float, q: Array, approximate: Any) -> None:
-    """Fill `q` (pairs,), cluster by cluster."""
+def _clusters(by_track: Side, claims: Ints, budget: float, approximate: Any) -> None:
+    """Turn the ratios into probabilities, cluster by cluster."""
     pairs, tracks, columns = by_track.other.size, by_track.start.size - 1, claims.size
     if pairs == 0:
         return
@@ -278,7 +271,7 @@ def _clusters(by_track: Side, claims: Ints, budget: float, q: Array, approximate
     by_plot, place = _by_plot(by_track, columns if left > 0.0 else 0)
     work, work2 = _work(max(tracks, columns), pairs), _work(max(tracks, columns), pairs)
     plots, listed = np.empty(columns, np.int64), np.zeros(columns, np.bool_)
-    store, q2 = np.empty(1024), np.empty(pairs)
+    store = np.empty(1024)
     for g in range(begin.size - 1):
         group = members[begin[g] : begin[g + 1]]
         cost, cost2, room, room2, n = math.inf, math.inf, 0, 0, 0
@@ -288,7 +281,7 @@ def _clusters(by_track: Side, claims: Ints, budget: float, q: Array, approximate
             if cost > _CHEAP:
                 cost2, room2 = _plan(plots[:n], by_plot, by_track, min(left, cost), work2)
         if min(cost, cost2) > left:
-            _propagate(group, by_track, columns, sweeps, q)
+            _propagate(group, by_track, columns, sweeps)
             for t in group:
                 approximate[t] = True
             continue
@@ -296,12 +289,12 @@ def _clusters(by_track: Side, claims: Ints, budget: float, q: Array, approximate
         if max(room, room2) > store.size:
             store = np.empty(max(room, room2))
         if cost <= cost2:
-            _eliminate(group.size, by_track, by_plot, work, store, q)
+            _eliminate(group.size, by_track, by_plot, work, store)
             continue
-        _eliminate(n, by_plot, by_track, work2, store, q2)
+        _eliminate(n, by_plot, by_track, work2, store)
         for c in plots[:n]:
             for k in range(by_plot.start[c], by_plot.start[c + 1]):
-                q[place[k]] = q2[k]
+                by_track.ratio[place[k]] = by_plot.ratio[k]
 
 
 @njit(cache=True, nogil=True)
@@ -310,10 +303,10 @@ def _too_wide(by_track: Side, claims: Ints) -> bool:
     for t in range(by_track.start.size - 1):
         if 0 < by_track.start[t + 1] - by_track.start[t] <= _WIDEST:
             return False
+    narrow = 0
     for c in range(claims.size):
-        if 1 < claims[c] <= _WIDEST:
-            return False
-    return True
+        narrow += 1 < claims[c] <= _WIDEST
+    return narrow == 0
 
 
 @njit(cache=True, nogil=True)

@@ -16,14 +16,14 @@ CLOSE = 1e-9
 
 # Sums in any order, so that they run in vectors.
 @njit(cache=True, nogil=True, error_model="numpy", fastmath={"reassoc", "nsz"})
-def propagate(members: Ints, tracks: Side, plots: int, sweeps: int, p: Array) -> bool:
-    """Fill `p` (pairs,) for the tracks `members`; False if `sweeps` sweeps were too few to converge.
+def propagate(members: Ints, tracks: Side, plots: int, sweeps: int) -> bool:
+    """Turn the ratios of the tracks `members` into probabilities; False if `sweeps` were too few to converge.
 
     A track tells a plot ratio / (1 + the sum over its other plots of ratio · message), a plot tells a
     track 1 / (1 + the sum over its other tracks of message). Only what the tracks told is kept: what a
     plot tells follows from that and from all that the plot has heard.
     """
-    told, heard, hears = np.zeros(p.size), np.ones(plots), np.empty(plots)
+    told, heard, hears = np.zeros(tracks.ratio.size), np.ones(plots), np.empty(plots)
     widest = 0
     for t in members:
         widest = max(widest, tracks.start[t + 1] - tracks.start[t])
@@ -47,12 +47,19 @@ def propagate(members: Ints, tracks: Side, plots: int, sweeps: int, p: Array) ->
         if change < CLOSE:
             converged = True
             break
+    used = hears
+    used[:] = 0.0
     for t in members:
         begin, end = tracks.start[t], tracks.start[t + 1]
         r, c, u = tracks.ratio[begin:end], tracks.other[begin:end], told[begin:end]
         total = _weigh(r, c, u, heard, weight)
         for k in range(r.size):
-            p[begin + k] = weight[k] / total
+            r[k] = weight[k] / total
+            used[c[k]] += r[k]
+    for t in members:
+        for k in range(tracks.start[t], tracks.start[t + 1]):
+            # Messages that have not converged may use a plot more than once.
+            tracks.ratio[k] /= max(used[tracks.other[k]], 1.0)
     return converged
 
 
