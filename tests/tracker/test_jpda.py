@@ -106,3 +106,109 @@ def test_nothing_to_associate(shape):
 def test_impossible_weights_are_refused(bad):
     with pytest.raises(ValueError, match="finite"):
         jpda.marginals(np.array([[0.1, bad]]))
+
+
+def partition(weights, forced=(-1, -1)):
+    """Sum over all events by a dictionary of taken plots; with `forced`, only those with that pair."""
+    tracks, columns = weights.shape
+    last = {j: max(np.flatnonzero(weights[:, j]), default=-1) for j in range(1, columns)}
+    states = {frozenset(): 1.0}
+    for t in range(tracks):
+        following = {}
+        for taken, weight in states.items():
+            for j in np.flatnonzero(weights[t]):
+                if j in taken or (t == forced[0] and j != forced[1]):
+                    continue
+                now = frozenset(c for c in taken | ({j} if j else set()) if last[c] > t)
+                following[now] = following.get(now, 0.0) + weight * weights[t, j]
+        states = following
+    return sum(states.values())
+
+
+@pytest.mark.parametrize(
+    ("tracks", "plots", "reach"),
+    [(8, 9, 9), (9, 5, 5), (5, 10, 10), (16, 16, 3), (30, 12, 2), (12, 30, 4)],
+)
+def test_wide_and_long_clusters(tracks, plots, reach):
+    """All-gated, and bands in mixed order, where columns come and go at all positions of the tables."""
+    rng = np.random.default_rng(tracks)
+    place = np.linspace(0, plots, tracks)
+    weights = np.exp(rng.normal(size=(tracks, plots + 1)))
+    weights[:, 1:] *= np.abs(np.arange(plots) + 0.5 - place[:, None]) < reach
+    weights[:, 0] = 0.1
+    mixed = rng.permutation(tracks)
+    found = np.empty_like(weights)
+    found[mixed] = jpda.marginals(weights[mixed])
+    whole = partition(weights)
+    for t, j in rng.permutation(np.argwhere(weights > 0))[:20]:
+        assert found[t, j] == pytest.approx(partition(weights, (t, j)) / whole, abs=1e-12)
+
+
+def test_the_sparse_call_agrees_with_the_dense():
+    likelihood = random_cluster(3, 30, 40, 0.08, 2.0)
+    row, col = np.nonzero(likelihood[:, 1:])
+    found = jpda.sparse(likelihood[:, 0].copy(), 40, row, col, likelihood[:, 1:][row, col])
+    dense = jpda.marginals(likelihood)
+    assert np.array_equal(found.p_miss, dense[:, 0])
+    assert np.array_equal(found.p, dense[row, col + 1])
+    assert not found.approximate.any()
+
+
+@pytest.mark.parametrize(
+    ("row", "col", "w"),
+    [
+        ([1, 0], [0, 0], [1.0, 1.0]),
+        ([0, 2], [0, 0], [1.0, 1.0]),
+        ([0, 1], [0, 3], [1.0, 1.0]),
+        ([0, 1], [-1, 0], [1.0, 1.0]),
+        ([0, 1], [0, 0], [1.0, np.nan]),
+        ([0, 1], [0, 0], [1.0]),
+    ],
+)
+def test_impossible_pairs_are_refused(row, col, w):
+    with pytest.raises(ValueError, match="pairs in range"):
+        jpda.sparse(np.full(2, 0.1), 3, np.array(row), np.array(col), np.array(w))
+
+
+def test_the_budget_is_that_of_the_call():
+    """Clusters are summed exactly while it lasts, the rest is approximated and says so."""
+    rng = np.random.default_rng(1)
+    many, size = 30, 8
+    row = np.repeat(np.arange(many * size), size)
+    col = np.repeat(np.arange(many), size * size) * size + np.tile(np.arange(size), many * size)
+    w, miss = np.exp(rng.normal(size=row.size)), np.full(many * size, 0.1)
+    whole = jpda.sparse(miss, many * size, row, col, w)
+    assert not whole.approximate.any()
+    part = jpda.sparse(miss, many * size, row, col, w, budget=1e5)
+    exact = ~part.approximate
+    assert 0 < np.count_nonzero(exact) < many * size
+    assert np.array_equal(part.p_miss[exact], whole.p_miss[exact])
+    assert np.all(part.approximate.reshape(many, size).any(axis=1) == part.approximate[::size])
+
+
+@pytest.mark.parametrize("shape", [(300, 500), (500, 300), (40, 40)])
+def test_what_is_too_wide_is_approximated(shape):
+    """A crowd: every row is a probability, no plot is used twice, and plots alike are treated alike."""
+    rng = np.random.default_rng(1)
+    likelihood = np.tile(np.exp(rng.normal(size=shape[0]))[:, None], (1, shape[1] + 1))
+    likelihood[:, 0] = 0.1
+    found = jpda.marginals(likelihood)
+    assert np.abs(found.sum(axis=1) - 1).max() <= 1e-12
+    assert found[:, 1:].sum(axis=0).max() <= 1 + 1e-12
+    assert np.ptp(found[:, 1:], axis=1).max() <= 1e-12
+
+
+def test_a_plot_of_one_track_is_a_part_of_its_miss():
+    """Folding it and summing over it are the same; what it takes stays in proportion to the miss."""
+    likelihood = np.array([[0.1, 2.0, 0.7, 0.3], [0.2, 3.0, 0.0, 0.0]])
+    found = jpda.marginals(likelihood)
+    assert np.abs(found - enumerate_events(likelihood)).max() <= 1e-15
+    assert found[0, 2:] / found[0, 0] == pytest.approx(likelihood[0, 2:] / 0.1)
+
+
+def test_a_pair_that_is_given_twice_counts_twice():
+    row, col, w = np.array([0, 0, 1]), np.array([0, 0, 0]), np.array([1.0, 2.0, 1.0])
+    found = jpda.sparse(np.array([0.5, 0.5]), 1, row, col, w)
+    once = enumerate_events(np.array([[0.5, 3.0], [0.5, 1.0]]))
+    assert found.p_miss == pytest.approx(once[:, 0])
+    assert found.p[:2].sum() == pytest.approx(once[0, 1])

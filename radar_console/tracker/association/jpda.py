@@ -1,35 +1,44 @@
 """Joint probabilistic data association: exact by dynamic programming, else belief propagation.
 
 A feasible event is a matching between tracks and measurements; its weight is the product of the
-ratios r = likelihood / miss weight over the matched pairs. The sum over all matchings goes over the
-*rows* of the ratio matrix one after the other; the state is which *columns* are taken, among those
-that earlier and later rows share. So the cost grows with what overlaps at once, not with the size
-of the cluster. Rows are the tracks or the measurements, whichever costs less: the sum is the same.
+ratios r = likelihood / miss weight over the matched pairs. A measurement that only one track gates is
+folded into that track's miss. What remains falls into clusters; each is summed over its tracks or
+over its measurements, whichever costs less, or is approximated when both are past the budget.
 
-Sources: Bar-Shalom, Willett, Tian, Tracking and Data Fusion, 2011, §6.2 (the probabilities);
-Horridge and Maskell, Real-time tracking of hundreds of targets with efficient exact JPDAF,
-FUSION 2006 (the elimination); Williams and Lau, Approximate evaluation of marginal association
-probabilities with belief propagation, IEEE T-AES 50(4), 2014, (24)-(26).
+Source: Bar-Shalom, Willett, Tian, Tracking and Data Fusion, 2011, §6.2 (the probabilities).
 """
 
 import math
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
 from radar_console.estimation.gaussian import Array
+from radar_console.tracker.association import elimination, pairs, propagation
+from radar_console.tracker.association.pairs import Ints, Side
 
-Ints = NDArray[np.int64]
+BUDGET = 8.0e6
+"""Steps of the exact sums of one call (about 1 ns each), beyond which clusters are approximated."""
 
-BUDGET = 1.0e6
-"""Steps of the exact sum for one cluster (about 5 ns each), beyond which it is approximated."""
-
-_WIDEST = 20  # columns in the state; 2^20 numbers at each row
 _SWEEPS = 200
-_CLOSE = 1e-9
-_LEAST_MISS = 1e-30  # of a row's largest weight: keeps a certain detection (P_D = 1) divisible
+_MESSAGES = 2.0e6  # of a call's belief propagation, about 3 ns each
+_BLOCK = 64  # weights of a dense row that are looked at together; less than 256
+_CHEAP = 256.0  # steps for which it is not worth while to look for a cheaper way
+
+_ratios, find = pairs.ratios, pairs.find
+_work, _plan, _eliminate = elimination.work, elimination.plan, elimination.eliminate
+_WIDEST = elimination.WIDEST
+_propagate = propagation.propagate
+
+
+class Marginals(NamedTuple):
+    """Probability of each pair (pairs,) and of each track's miss (tracks,); whose are approximate."""
+
+    p: Array
+    p_miss: Array
+    approximate: NDArray[np.bool_]
 
 
 def marginals(likelihood: Array, budget: float = BUDGET) -> Array:
@@ -39,7 +48,7 @@ def marginals(likelihood: Array, budget: float = BUDGET) -> Array:
     ----------
     likelihood : (tracks, measurements + 1)  column 0 the miss weight 1 - P_D P_G; entry [t, j + 1]
         P_D N(z_j) / λ, and 0 outside the gate
-    budget : steps of the exact sum for one cluster; a costlier one is approximated
+    budget : steps of the exact sums; clusters beyond it are approximated
 
     Returns
     -------
@@ -50,33 +59,84 @@ def marginals(likelihood: Array, budget: float = BUDGET) -> Array:
     ValueError      a weight is negative or not finite
     """
     weights = np.ascontiguousarray(likelihood, dtype=float)
-    if not np.all(np.isfinite(weights)) or np.any(weights < 0):
+    result = np.zeros(weights.shape)
+    if not _dense(weights, budget, result):
         raise ValueError("expected finite weights that are not negative")
-    result = np.zeros_like(weights)
-    _dense(weights, budget, result)
     return result
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
-def _dense(weights: Array, budget: float, result: Array) -> None:
-    tracks, columns = weights.shape
-    count = 0
-    for t in range(tracks):
-        for j in range(1, columns):
-            count += weights[t, j] > 0
-    row, col, w = np.empty(count, np.int64), np.empty(count, np.int64), np.empty(count)
-    miss = weights[:, 0].copy()
-    k = 0
-    for t in range(tracks):
-        for j in range(1, columns):
-            if weights[t, j] > 0:
-                row[k], col[k], w[k] = t, j - 1, weights[t, j]
-                k += 1
+def sparse(miss: Array, columns: int, row: Ints, col: Ints, w: Array, budget: float = BUDGET) -> Marginals:
+    """The same from the pairs inside the gates alone: `solve`, with its arrays checked and made.
+
+    Parameters
+    ----------
+    miss : (tracks,)   weight of no measurement, 1 - P_D P_G
+    columns : number of measurements
+    row, col : (pairs,)   track, ascending, and measurement of each pair
+    w : (pairs,)   P_D N(z) / λ
+
+    Raises
+    ------
+    ValueError      a weight is negative or not finite, or a pair is out of range or order
+    """
+    tracks, count = len(miss), len(row)
     p, p_miss, approximate = np.empty(count), np.empty(tracks), np.zeros(tracks, np.bool_)
+    if len(col) != count or len(w) != count or not _sound(miss, columns, row, col, w):
+        raise ValueError("expected finite weights that are not negative, and pairs in range, rows ascending")
+    solve(miss, columns, row, col, w, budget, p, p_miss, approximate)
+    return Marginals(p, p_miss, approximate)
+
+
+@njit(cache=True, nogil=True)
+def _sound(miss: Array, columns: int, row: Ints, col: Ints, w: Array) -> bool:
+    before = 0
+    for t in range(miss.size):
+        if not 0.0 <= miss[t] < math.inf:
+            return False
+    for k in range(row.size):
+        if not (before <= row[k] < miss.size and 0 <= col[k] < columns and 0.0 <= w[k] < math.inf):
+            return False
+        before = row[k]
+    return True
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _dense(weights: Array, budget: float, result: Array) -> bool:
+    """Fill `result`; False if a weight is not sound."""
+    tracks, columns = weights.shape
+    blocks = (columns - 1 + _BLOCK - 1) // _BLOCK
+    some, pairs = np.empty((tracks, blocks), np.uint8), 0
+    for t in range(tracks):
+        gate = weights[t, 1:]
+        for b in range(blocks):
+            block, count = gate[b * _BLOCK : (b + 1) * _BLOCK], 0
+            for j in range(block.size):  # without a branch: as fast as memory delivers
+                count += block[j] != 0.0
+            some[t, b] = count
+            pairs += count
+    row, col, w = np.empty(pairs, np.int64), np.empty(pairs, np.int64), np.empty(pairs)
+    miss, n = np.empty(tracks), 0
+    for t in range(tracks):
+        miss[t] = weights[t, 0]
+        if not 0.0 <= miss[t] < math.inf:
+            return False
+        for b in range(blocks):
+            if some[t, b] == 0:
+                continue
+            block = weights[t, 1 + b * _BLOCK : 1 + (b + 1) * _BLOCK]
+            for j in range(block.size):
+                if block[j] != 0.0:
+                    if not 0.0 < block[j] < math.inf:
+                        return False
+                    row[n], col[n], w[n] = t, b * _BLOCK + j, block[j]
+                    n += 1
+    p, p_miss, approximate = np.empty(n), np.empty(tracks), np.zeros(tracks, np.bool_)
     solve(miss, columns - 1, row, col, w, budget, p, p_miss, approximate)
-    result[:, 0] = p_miss
-    for k in range(count):
+    for t in range(tracks):
+        result[t, 0] = p_miss[t]
+    for k in range(n):
         result[row[k], col[k] + 1] = p[k]
+    return True
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -94,292 +154,169 @@ def solve(
     """The sparse problem: `miss` (tracks,) and the pairs `row`, `col`, `w` (pairs,), rows ascending.
 
     Fills `p` (pairs,), `p_miss` (tracks,) and `approximate` (tracks,) for the tracks whose cluster
-    was past the budget.
+    was past what was left of the budget.
     """
-    tracks, pairs = miss.size, row.size
-    ratio = np.empty(pairs)
-    largest = miss.copy()
-    for k in range(pairs):
-        largest[row[k]] = max(largest[row[k]], w[k])
-    for k in range(pairs):
-        ratio[k] = w[k] / max(miss[row[k]], _LEAST_MISS * largest[row[k]])
-    label = _components(tracks, columns, row, col)
-    order = np.argsort(label, kind="mergesort")  # tracks of one component stand together
-    first = np.searchsorted(row, np.arange(tracks + 1))
-    column_name = np.full(columns, -1, np.int64)
-    begin = 0
-    while begin < tracks:
-        stop = begin + 1
-        while stop < tracks and label[order[stop]] == label[order[begin]]:
-            stop += 1
-        members = order[begin:stop]
-        begin = stop
-        size = 0
-        for t in members:
-            size += first[t + 1] - first[t]
-        if size == 0:
-            p_miss[members[0]] = 1.0
-            continue
-        if members.size == 1:
-            _single(members[0], first, ratio, p, p_miss)
-            continue
-        start, local, r = np.zeros(members.size + 1, np.int64), np.empty(size, np.int64), np.empty(size)
-        used, n = 0, 0
-        for i in range(members.size):
-            for k in range(first[members[i]], first[members[i] + 1]):
-                if column_name[col[k]] < 0:
-                    column_name[col[k]] = used
-                    used += 1
-                local[n], r[n] = column_name[col[k]], ratio[k]
+    tracks = miss.size
+    approximate[:] = False
+    ratio = _ratios(miss, row, w)
+    claims = np.zeros(columns, np.int64)
+    for k in range(row.size):
+        claims[col[k]] += 1
+    by_track, free = _shared(tracks, row, col, ratio, claims, p)
+    _clusters(by_track, claims, budget, approximate)
+    n, k = 0, 0
+    for t in range(tracks):
+        rest = 1.0
+        for m in range(by_track.start[t], by_track.start[t + 1]):
+            rest -= by_track.ratio[m]
+        rest = max(rest, 0.0) / free[t]  # of the track's miss; its own plots take their shares of it
+        p_miss[t] = rest
+        while k < row.size and row[k] == t:
+            if claims[col[k]] == 1:
+                p[k] *= rest
+            else:
+                p[k] = by_track.ratio[n]
                 n += 1
-            start[i + 1] = n
-        q = np.empty(size)
-        rough = _cluster(start, local, r, used, budget, q)
-        n = 0
-        for i in range(members.size):
-            total = 0.0
-            for k in range(first[members[i]], first[members[i] + 1]):
-                p[k] = q[n]
-                total += q[n]
-                n += 1
-            p_miss[members[i]] = max(1.0 - total, 0.0)
-            approximate[members[i]] = rough
+            k += 1
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _components(tracks: int, columns: int, row: Ints, col: Ints) -> Ints:
-    """The lowest track of each track's component, by union-find."""
-    parent = np.arange(tracks)
-    seen = np.full(columns, -1, np.int64)
+def _shared(tracks: int, row: Ints, col: Ints, ratio: Array, claims: Ints, own: Array) -> tuple[Side, Array]:
+    """The pairs whose plot several tracks gate, their ratios to a track's miss and own plots together.
+
+    Moves them to the front of `ratio`, and copies the others to their places in `own`: on large problems
+    fresh memory costs more than the sums. Also returns that weight `free` (tracks,) of miss and own plots.
+    """
+    free = np.ones(tracks)
+    count = 0
     for k in range(row.size):
-        if seen[col[k]] < 0:
-            seen[col[k]] = row[k]
+        if claims[col[k]] == 1:
+            free[row[k]] += ratio[k]
         else:
-            a, b = find(parent, row[k]), find(parent, seen[col[k]])
-            parent[max(a, b)] = min(a, b)
+            count += 1
+    start, other = np.zeros(tracks + 1, np.int64), np.empty(count, np.int64)
+    n, k = 0, 0
+    for t in range(tracks):
+        while k < row.size and row[k] == t:
+            if claims[col[k]] == 1:
+                own[k] = ratio[k]
+            else:
+                other[n], ratio[n] = col[k], ratio[k] / free[t]
+                n += 1
+            k += 1
+        start[t + 1] = n
+    return Side(start, other, ratio[:count]), free
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _by_plot(by_track: Side, columns: int) -> tuple[Side, Ints]:
+    """The same pairs by plot, and the place of each by track; of no `columns`, none."""
+    pairs = by_track.other.size if columns > 0 else 0
+    start = np.zeros(columns + 1, np.int64)
+    for c in by_track.other[:pairs]:
+        start[c + 1] += 1
+    for c in range(columns):
+        start[c + 1] += start[c]
+    fill = start[:-1].copy()
+    other, r, place = np.empty(pairs, np.int64), np.empty(pairs), np.empty(pairs, np.int64)
+    for t in range(by_track.start.size - 1 if pairs > 0 else 0):
+        for k in range(by_track.start[t], by_track.start[t + 1]):
+            n = fill[by_track.other[k]]
+            fill[by_track.other[k]] += 1
+            other[n], r[n], place[n] = t, by_track.ratio[k], k
+    return Side(start, other, r), place
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _components(by_track: Side, columns: int) -> tuple[Ints, Ints]:
+    """Tracks that share plots, one component after the other, and where each begins."""
+    tracks = by_track.start.size - 1
+    parent, claimant = np.arange(tracks), np.full(columns, -1, np.int64)
+    for t in range(tracks):
+        for c in by_track.other[by_track.start[t] : by_track.start[t + 1]]:
+            if claimant[c] < 0:
+                claimant[c] = t
+            elif parent[t] != parent[claimant[c]]:
+                a, b = find(parent, t), find(parent, claimant[c])
+                parent[max(a, b)] = min(a, b)
+    size = np.zeros(tracks, np.int64)
     for t in range(tracks):
         parent[t] = find(parent, t)
-    return parent
+        size[parent[t]] += by_track.start[t + 1] > by_track.start[t]
+    begin, count, total = np.empty(tracks + 1, np.int64), 0, 0
+    for t in range(tracks):  # a root is the lowest of its tracks
+        if size[t] > 0:
+            begin[count] = total
+            count += 1
+            total, size[t] = total + size[t], total
+    begin[count] = total
+    members = np.empty(total, np.int64)
+    for t in range(tracks):
+        if by_track.start[t + 1] > by_track.start[t]:
+            members[size[parent[t]]] = t
+            size[parent[t]] += 1
+    return members, begin[: count + 1]
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _clusters(by_track: Side, claims: Ints, budget: float, approximate: Any) -> None:
+    """Turn the ratios into probabilities, cluster by cluster."""
+    pairs, tracks, columns = by_track.other.size, by_track.start.size - 1, claims.size
+    if pairs == 0:
+        return
+    members, begin = _components(by_track, columns)
+    left, sweeps = budget, min(_SWEEPS, max(int(_MESSAGES / pairs), 1))
+    if _too_wide(by_track, claims):
+        left = 0.0
+    by_plot, place = _by_plot(by_track, columns if left > 0.0 else 0)
+    work, work2 = _work(max(tracks, columns), pairs), _work(max(tracks, columns), pairs)
+    plots, listed = np.empty(columns, np.int64), np.zeros(columns, np.bool_)
+    store = np.empty(1024)
+    for g in range(begin.size - 1):
+        group = members[begin[g] : begin[g + 1]]
+        cost, cost2, room, room2, n = math.inf, math.inf, 0, 0, 0
+        if left > 0.0:
+            n = _list_plots(group, by_track, listed, plots)
+            cost, room = _plan(group, by_track, by_plot, left, work)
+            if cost > _CHEAP:
+                cost2, room2 = _plan(plots[:n], by_plot, by_track, min(left, cost), work2)
+        if min(cost, cost2) > left:
+            _propagate(group, by_track, columns, sweeps)
+            for t in group:
+                approximate[t] = True
+            continue
+        left -= min(cost, cost2)
+        if max(room, room2) > store.size:
+            store = np.empty(max(room, room2))
+        if cost <= cost2:
+            _eliminate(group.size, by_track, by_plot, work, store)
+            continue
+        _eliminate(n, by_plot, by_track, work2, store)
+        for c in plots[:n]:
+            for k in range(by_plot.start[c], by_plot.start[c + 1]):
+                by_track.ratio[place[k]] = by_plot.ratio[k]
 
 
 @njit(cache=True, nogil=True)
-def find(parent: Ints, i: int) -> int:
-    """The root of `i`; shortens the path on the way."""
-    while parent[i] != i:
-        parent[i] = parent[parent[i]]
-        i = parent[i]
-    return i
+def _too_wide(by_track: Side, claims: Ints) -> bool:
+    """Every track and every plot alone makes more columns live than the exact sum can have."""
+    for t in range(by_track.start.size - 1):
+        if 0 < by_track.start[t + 1] - by_track.start[t] <= _WIDEST:
+            return False
+    narrow = 0
+    for c in range(claims.size):
+        narrow += 1 < claims[c] <= _WIDEST
+    return narrow == 0
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
-def _single(t: int, first: Ints, ratio: Array, p: Array, p_miss: Array) -> None:
-    """A track that shares nothing."""
-    largest = 1.0
-    for k in range(first[t], first[t + 1]):
-        largest = max(largest, ratio[k])
-    total = 1.0 / largest
-    for k in range(first[t], first[t + 1]):
-        total += ratio[k] / largest
-    for k in range(first[t], first[t + 1]):
-        p[k] = ratio[k] / largest / total
-    p_miss[t] = 1.0 / largest / total
-
-
-@njit(cache=True, nogil=True, error_model="numpy")
-def _cluster(start: Ints, col: Ints, r: Array, columns: int, budget: float, p: Array) -> bool:
-    """One component; True if it was approximated."""
-    rows, pairs = start.size - 1, col.size
-    start2 = np.zeros(columns + 1, np.int64)  # the same matrix by columns
-    for k in range(pairs):
-        start2[col[k] + 1] += 1
-    start2 = np.cumsum(start2)
-    fill = start2[:-1].copy()
-    col2, r2, where = np.empty(pairs, np.int64), np.empty(pairs), np.empty(pairs, np.int64)
-    for i in range(rows):
-        for k in range(start[i], start[i + 1]):
-            n = fill[col[k]]
-            fill[col[k]] += 1
-            col2[n], r2[n], where[n] = i, r[k], k
-    order, order2 = np.empty(rows, np.int64), np.empty(columns, np.int64)
-    cost = _plan(start, col, start2, col2, order)
-    cost2 = _plan(start2, col2, start, col, order2)
-    if min(cost, cost2) > budget:
-        _propagate(start, col, r, columns, p)
-        return True
-    if cost <= cost2:
-        _eliminate(start, col, r, columns, order, p)
-    else:
-        p2 = np.empty(pairs)
-        _eliminate(start2, col2, r2, rows, order2, p2)
-        for n in range(pairs):
-            p[where[n]] = p2[n]
-    return False
-
-
-@njit(cache=True, nogil=True, error_model="numpy")
-def _plan(start: Ints, col: Ints, start2: Ints, col2: Ints, order: Ints) -> float:
-    """Fill the order of rows that keeps the state narrow, greedily; the cost of the exact sum."""
-    rows, columns = start.size - 1, start2.size - 1
-    left = np.empty(columns, np.int64)
-    for c in range(columns):
-        left[c] = start2[c + 1] - start2[c]
-    live = np.zeros(columns, np.bool_)
-    done, near = np.zeros(rows, np.bool_), np.zeros(rows, np.bool_)
-    width, cost = 0, 0.0
-    for n in range(rows):
-        best, best_width = -1, 0
-        for any_row in range(2):  # first the neighbours of the live columns, else any row
-            for i in range(rows):
-                if done[i] or not (near[i] or any_row):
-                    continue
-                after = width
-                for k in range(start[i], start[i + 1]):
-                    c = col[k]
-                    if left[c] == 1:
-                        after -= live[c]
-                    else:
-                        after += not live[c]
-                if best < 0 or after < best_width:
-                    best, best_width = i, after
-            if best >= 0:
-                break
-        order[n], done[best] = best, True
-        cost += (start[best + 1] - start[best] + 1) * math.ldexp(1.0, min(width, 1000))
-        for k in range(start[best], start[best + 1]):
-            c = col[k]
-            left[c] -= 1
-            if not live[c]:
-                live[c] = True
-                for m in range(start2[c], start2[c + 1]):
-                    near[col2[m]] = True
-        width = best_width
-        if width > _WIDEST:
-            return math.inf
-    return cost
-
-
-@njit(cache=True, nogil=True, error_model="numpy")
-def _eliminate(start: Ints, col: Ints, r: Array, columns: int, order: Ints, p: Array) -> None:
-    """Forward and backward sums over the rows; a state is the set of taken columns, as bits."""
-    rows, pairs = start.size - 1, col.size
-    left = np.zeros(columns, np.int64)
-    for k in range(pairs):
-        left[col[k]] += 1
-    private = left == 1  # used by one row only: a part of that row's free choice
-    bit = np.zeros(pairs, np.int64)
-    held = np.zeros(columns, np.int64)
-    before, ends = np.zeros(rows + 1, np.int64), np.zeros(rows, np.int64)
-    offset = np.zeros(rows + 2, np.int64)
-    offset[1] = 1
-    mask = 0
-    for n in range(rows):
-        i = order[n]
-        for k in range(start[i], start[i + 1]):
-            c = col[k]
-            if private[c]:
-                continue
-            if held[c] == 0:
-                held[c] = ~mask & (mask + 1)  # the lowest bit that is free
-                mask |= held[c]
-            bit[k] = held[c]
-            left[c] -= 1
-            if left[c] == 0:
-                ends[n] |= held[c]
-        mask &= ~ends[n]
-        before[n + 1] = mask
-        size = 1
-        while size <= mask:
-            size *= 2
-        offset[n + 2] = offset[n + 1] + size
-
-    free = np.ones(rows)
-    for i in range(rows):
-        for k in range(start[i], start[i + 1]):
-            if private[col[k]]:
-                free[i] += r[k]
-
-    forward = np.zeros(offset[rows + 1])
-    forward[0] = 1.0
-    for n in range(rows):
-        i = order[n]
-        source, sink = forward[offset[n] :], forward[offset[n + 1] : offset[n + 2]]
-        s = 0
-        while True:
-            a = source[s]
-            if a > 0.0:
-                sink[s & ~ends[n]] += a * free[i]
-                for k in range(start[i], start[i + 1]):
-                    if bit[k] and not s & bit[k]:
-                        sink[(s | bit[k]) & ~ends[n]] += a * r[k]
-            s = ((s | ~before[n]) + 1) & before[n]
-            if s == 0:
-                break
-        sink /= sink.max()
-
-    widest = 1
-    for n in range(rows + 1):
-        widest = max(widest, offset[n + 1] - offset[n])
-    behind, ahead = np.zeros(widest), np.zeros(widest)
-    ahead[0] = 1.0
-    for n in range(rows - 1, -1, -1):
-        i = order[n]
-        source = forward[offset[n] :]
-        for k in range(start[i], start[i + 1]):
-            p[k] = 0.0
-        total, largest = 0.0, 0.0
-        s = 0
-        while True:
-            g = free[i] * ahead[s & ~ends[n]]
-            total += source[s] * g
-            for k in range(start[i], start[i + 1]):
-                if bit[k] and not s & bit[k]:
-                    h = r[k] * ahead[(s | bit[k]) & ~ends[n]]
-                    p[k] += source[s] * h
-                    g += h
-            behind[s] = g
-            largest = max(largest, g)
-            s = ((s | ~before[n]) + 1) & before[n]
-            if s == 0:
-                break
-        free_total = total
-        for k in range(start[i], start[i + 1]):
-            total += p[k]
-        for k in range(start[i], start[i + 1]):
-            p[k] = free_total * r[k] / free[i] / total if bit[k] == 0 else p[k] / total
-        s = 0
-        while True:
-            behind[s] /= largest
-            s = ((s | ~before[n]) + 1) & before[n]
-            if s == 0:
-                break
-        behind, ahead = ahead, behind
-
-
-@njit(cache=True, nogil=True, error_model="numpy")
-def _propagate(start: Ints, col: Ints, r: Array, columns: int, p: Array) -> None:
-    """Loopy belief propagation; it always converges."""
-    rows, pairs = start.size - 1, col.size
-    to_track, to_plot, heard = np.ones(pairs), np.empty(pairs), np.empty(columns)
-    for _ in range(_SWEEPS):
-        heard[:] = 1.0
-        for i in range(rows):
-            total = 1.0
-            for k in range(start[i], start[i + 1]):
-                total += r[k] * to_track[k]
-            for k in range(start[i], start[i + 1]):
-                # What is left without this pair; never below the miss's 1, whatever rounding does.
-                to_plot[k] = r[k] / max(total - r[k] * to_track[k], 1.0)
-                heard[col[k]] += to_plot[k]
-        change = 0.0
-        for k in range(pairs):
-            message = 1.0 / max(heard[col[k]] - to_plot[k], 1.0)
-            change = max(change, abs(message - to_track[k]))
-            to_track[k] = message
-        if change < _CLOSE:
-            break
-    for i in range(rows):
-        total = 1.0
-        for k in range(start[i], start[i + 1]):
-            total += r[k] * to_track[k]
-        for k in range(start[i], start[i + 1]):
-            p[k] = r[k] * to_track[k] / total
+@njit(cache=True, nogil=True)
+def _list_plots(group: Ints, by_track: Side, listed: NDArray[np.bool_], plots: Ints) -> int:
+    """Fill `plots` with those of a cluster; how many."""
+    n = 0
+    for t in group:
+        for c in by_track.other[by_track.start[t] : by_track.start[t + 1]]:
+            if not listed[c]:
+                listed[c] = True
+                plots[n] = c
+                n += 1
+    return n
