@@ -18,7 +18,7 @@ import typer
 
 from benchmarks import report, scenes
 from benchmarks.scenes import Scene
-from radar_console.core.messages import NO_TRACKS, Table
+from radar_console.core.messages import NO_CENTROIDS, NO_TRACKS, Table
 from radar_console.estimation.gaussian import Array
 from radar_console.evaluation.gospa import gospa
 from radar_console.evaluation.sampling import snapshots
@@ -76,18 +76,21 @@ def track(
     Parameters
     ----------
     settings : of [tracker], where they are not the default
-    given : TRACK, confirmed tracks to start with
+    given : TRACK, confirmed tracks at the first scan's instant, of a snapshot scene
     pushes : sectors a turn
     """
     tracker = Tracker(TrackerSettings(**settings), scene.radar, seed)
     parts = scenes.sectors(scene, pushes)
     rows, cpu, wall = [NO_TRACKS], [], []
-    tracker.push(parts[0].pop(0))
     if given is not None:
         if not hasattr(tracker, "adopt"):
             return None
+        # The tracks are those of the first scan's instant: its turn has passed, and its plots are used up.
+        for sector in parts.pop(0):
+            tracker.push(sector.adding(centroids=NO_CENTROIDS))
         tracker.adopt(given)
-        parts[0] = [sector.adding(centroids=sector.centroids[:0]) for sector in parts[0]]
+        rows.append(given)
+        cpu, wall = [0.0], [0.0]
     for part in parts:
         began = time.process_time(), time.perf_counter()
         rows += [tracker.push(sector).tracks for sector in part]
