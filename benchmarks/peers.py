@@ -27,7 +27,7 @@ OURS = "ours, particle"
 FIRST = 29  # scans of ring25 that the others are asked to track
 JOINT = ("PF + EHM2", "EKF + EHM2")
 EACH = (*JOINT, "UKF + EHM2", "EKF + GNN")
-GET = ".venv/bin/pip install -e '.[bench]'"
+GET = ".venv/bin/pip install --require-hashes -r requirements-bench.lock"
 
 # Scenes, and the peers' trackers that run on them.
 CASES = [
