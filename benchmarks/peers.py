@@ -31,7 +31,7 @@ GET = ".venv/bin/pip install --require-hashes -r requirements-bench.lock"
 
 # Scenes, and the peers' trackers that run on them.
 CASES = [
-    (Case("ring25, from scratch", "ring25", {"scans": FIRST}, STRAIGHT), JOINT),
+    (Case("ring25, from scratch", "ring25", {"scans": FIRST}, STRAIGHT, seeds=3), JOINT),
     (Case("ring25, given", "ring25", {"scans": FIRST}, STRAIGHT, given=True), EACH),
     (Case("crossing2, given", "crossing2", {}, STRAIGHT, seeds=3, given=True), EACH),
     (Case("formation 8, given", "formation", {"count": 8}, STRAIGHT, seeds=3, given=True, quick=True), EACH),

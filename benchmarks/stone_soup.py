@@ -47,7 +47,7 @@ from stonesoup.updater.kalman import ExtendedKalmanUpdater, UnscentedKalmanUpdat
 from stonesoup.updater.particle import ParticleUpdater
 
 from benchmarks.scenes import PERIOD, Scene, formation, given_tracks
-from benchmarks.tracking import Run
+from benchmarks.tracking import Run, peak_mb
 from radar_console.core.messages import TRACK, Table, TrackStatus, blank
 
 Q = 1.0  # m²/s³
@@ -153,7 +153,7 @@ def track(scene: Scene, name: str, given: Table | None, seed: int) -> Run:
             _rows(before - tracks, numbers, _seconds(now), TrackStatus.DELETED),
         ]
     median = float(np.median(initiation)) if given is None else math.nan
-    return Run(np.concatenate(rows), np.array(cpu), np.array(wall), median)
+    return Run(np.concatenate(rows), np.array(cpu), np.array(wall), peak_mb(), median)
 
 
 def _update(tracks: set[Any], detections: set[Any], now: datetime, parts: Parts) -> set[Any]:

@@ -40,6 +40,7 @@ class Run:
     rows: Table
     cpu: Array
     wall: Array
+    memory_mb: float = math.nan  # the largest that the process had held when it was done
     initiation: float = math.nan  # s of `cpu` a scan, median, that initiation took; NaN not known
 
 
@@ -99,7 +100,7 @@ def track(
     last = tracker.flush()
     if last is not None:
         rows.append(last.tracks)
-    return Run(np.concatenate(rows), np.array(cpu), np.array(wall))
+    return Run(np.concatenate(rows), np.array(cpu), np.array(wall), peak_mb())
 
 
 def score(scene: Scene, run: Run, before_mb: float = math.nan, warm: int = WARM) -> Score:
@@ -121,7 +122,7 @@ def score(scene: Scene, run: Run, before_mb: float = math.nan, warm: int = WARM)
         lost=int(track_metrics(scene.truth, run.rows, LOST).lost.sum()),
         false=int(story.false.sum()),
         duplicate=int(story.duplicate.sum()),
-        memory_mb=peak_mb(),
+        memory_mb=run.memory_mb,
         before_mb=before_mb,
     )
 

@@ -1,14 +1,13 @@
 """The cheapest one-to-one assignment between two sets of points, up to a cut-off distance.
 
-Pairs at the cut-off or beyond are no pairs, so only points that are linked by nearer pairs compete:
-each connected component of those is solved by itself, and most have one point on either side.
+Pairs at the cut-off or beyond are no pairs. Only the nearer ones, found with a tree, go into the
+assignment, which is sparse: points that no chain of near pairs links never meet in it.
 """
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.optimize import linear_sum_assignment
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
+from scipy.sparse import csr_array
+from scipy.sparse.csgraph import min_weight_full_bipartite_matching
 from scipy.spatial import KDTree
 
 from radar_console.estimation.gaussian import Array
@@ -48,17 +47,17 @@ def match(first: Array, second: Array, c: float, p: float = 2.0) -> tuple[Index,
     (pairs,) rows of `first`, in rising order, (pairs,) rows of `second`, and (pairs,) distances, m
     """
     i, j, distance = _near(first, second, c)
-    label = _components(i, j, len(first), len(second))
-    order = np.argsort(label, kind="stable")
-    i, j, distance, label = i[order], j[order], distance[order], label[order]
-    lone = np.bincount(label)[label] == 1
-    edges = np.flatnonzero(~lone)
-    starts = np.flatnonzero(np.diff(label[edges]) != 0) + 1
-    parts = np.split(edges, starts) if len(edges) else []
-    solved = [part[_cheapest(i[part], j[part], distance[part], c, p)] for part in parts]
-    pairs = np.concatenate([np.flatnonzero(lone), *solved])
-    pairs = pairs[np.argsort(i[pairs])]
-    return i[pairs], j[pairs], distance[pairs]
+    n, m = len(first), len(second)
+    if not len(i):
+        return i, j, distance
+    # Each point of the first set may also take a place of its own, at the price of the cut-off.
+    # Prices are relative to that, so that no power overflows, and not 0, which a sparse array drops.
+    price = np.concatenate([np.maximum((distance / c) ** p, np.finfo(float).tiny), np.ones(n)])
+    own = np.arange(n)
+    graph = csr_array((price, (np.append(i, own), np.append(j, m + own))), shape=(n, m + n))
+    row, column = min_weight_full_bipartite_matching(graph)
+    i, j = (np.asarray(found[column < m], np.intp) for found in (row, column))
+    return i, j, np.linalg.norm(first[i] - second[j], axis=1)
 
 
 def _near(first: Array, second: Array, c: float) -> tuple[Index, Index, Array]:
@@ -70,22 +69,3 @@ def _near(first: Array, second: Array, c: float) -> tuple[Index, Index, Array]:
     distance = np.linalg.norm(first[i] - second[j], axis=1)
     inside = distance < c
     return i[inside], j[inside], distance[inside]
-
-
-def _components(i: Index, j: Index, n: int, m: int) -> NDArray[np.int32]:
-    """Of each pair, the number of the connected component that it belongs to."""
-    graph = coo_array((np.ones(len(i)), (i, n + j)), shape=(n + m, n + m))
-    label: NDArray[np.int32] = connected_components(graph, directed=False)[1]
-    return label[i]
-
-
-def _cheapest(i: Index, j: Index, distance: Array, c: float, p: float) -> Index:
-    """Which of a component's pairs are assigned."""
-    rows, row = np.unique(i, return_inverse=True)
-    columns, column = np.unique(j, return_inverse=True)
-    cost, pair = np.ones((len(rows), len(columns))), np.full((len(rows), len(columns)), -1)
-    cost[row, column] = (distance / c) ** p  # relative to the cut-off: no power overflows
-    pair[row, column] = np.arange(len(i))
-    solved = pair[linear_sum_assignment(cost)]
-    assigned: Index = solved[solved >= 0]
-    return assigned

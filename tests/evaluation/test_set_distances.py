@@ -153,7 +153,7 @@ def test_large_powers():
 
 @settings(deadline=None)  # the full assignment of the oracle may take long
 @given(st.integers(0, 2**32 - 1), st.sampled_from([50.0, 400.0, 3000.0]))
-def test_components_solve_what_the_whole_solves(seed, c):
+def test_the_sparse_assignment_is_the_whole_one(seed, c):
     rng = np.random.default_rng(seed)
     x, y = rng.uniform(0, 3000, (rng.integers(0, 60), 2)), rng.uniform(0, 3000, (rng.integers(0, 60), 2))
     cost = np.minimum(np.linalg.norm(x[:, None] - y[None, :], axis=2), c) ** 2
