@@ -9,7 +9,8 @@ probabilities times the weights that each alone would give.
 q, P_D and the clutter density are the scene's. Stone Soup takes one density in bearing and range, so it
 is that of the plane times the targets' mean range. The gate of 0.99 and the four hits of an initiation
 are chosen for it: with our 0.9999 its association of a formation takes twenty times as long, and with
-three hits it starts dozens of false tracks.
+three hits it starts dozens of false tracks. It works in kilometres: beside metres squared it takes the
+variance of a good azimuth for zero, and refuses the covariance.
 """
 
 import math
@@ -49,6 +50,7 @@ from stonesoup.updater.particle import ParticleUpdater
 from benchmarks.scenes import PERIOD, Scene, formation, given_tracks
 from benchmarks.tracking import Run, peak_mb
 from radar_console.core.messages import TRACK, Table, TrackStatus, blank
+from radar_console.core.units import KM
 
 Q = 1.0  # m²/s³
 P_G, GATE = 0.99, 3.03  # and the Mahalanobis distance that belongs to it
@@ -90,9 +92,9 @@ def one_step(name: str) -> Callable[[], Any]:
 def parts_of(scene: Scene, name: str) -> Parts:
     """The components of ``PF + EHM2``, ``EKF + EHM2``, ``UKF + EHM2`` or ``EKF + GNN``."""
     filter_name, _, association = name.partition(" + ")
-    sd = scene.radar.sd_azimuth, scene.radar.sd_range
+    sd = scene.radar.sd_azimuth, scene.radar.sd_range / KM
     model = CartesianToBearingRange(ndim_state=4, mapping=(0, 2), noise_covar=np.diag(np.square(sd)))
-    motion = CombinedLinearGaussianTransitionModel([ConstantVelocity(Q), ConstantVelocity(Q)])
+    motion = CombinedLinearGaussianTransitionModel([ConstantVelocity(Q / KM**2)] * 2)
     extended = ExtendedKalmanPredictor(motion), ExtendedKalmanUpdater(model)
     predictor, updater = {
         "EKF": extended,
@@ -106,10 +108,10 @@ def parts_of(scene: Scene, name: str) -> Parts:
         )
     else:
         mean_range = float(np.mean(np.hypot(scene.truth["east"], scene.truth["north"])))
-        associator = JPDAWithEHM2(
-            PDAHypothesiser(predictor, updater, scene.clutter * mean_range, scene.p_d, P_G)
-        )
-    unknown = GaussianState(np.zeros((4, 1)), np.diag([0.0, (SPEED / 2) ** 2, 0.0, (SPEED / 2) ** 2]))
+        density = scene.clutter * mean_range * KM  # per radian and kilometre
+        associator = JPDAWithEHM2(PDAHypothesiser(predictor, updater, density, scene.p_d, P_G))
+    spread = (SPEED / 2 / KM) ** 2
+    unknown = GaussianState(np.zeros((4, 1)), np.diag([0.0, spread, 0.0, spread]))
     initiator = MultiMeasurementInitiator(
         unknown, UpdateTimeStepsDeleter(2), GNNWith2DAssignment(near), extended[1], model, min_points=HITS
     )
@@ -217,7 +219,9 @@ def _detections(scene: Scene, model: Any) -> Iterator[tuple[datetime, set[Any]]]
         yield (
             now,
             {
-                Detection(StateVector([Bearing(math.pi / 2 - a), r]), timestamp=now, measurement_model=model)
+                Detection(
+                    StateVector([Bearing(math.pi / 2 - a), r / KM]), timestamp=now, measurement_model=model
+                )
                 for r, a in zip(rows["range"].tolist(), rows["azimuth"].tolist(), strict=True)
             },
         )
@@ -226,8 +230,8 @@ def _detections(scene: Scene, model: Any) -> Iterator[tuple[datetime, set[Any]]]
 def _state(row: Any, particles: bool) -> Any:
     """A given track's first state."""
     names = ("east", "v_east", "north", "v_north")
-    mean = np.array([[row[name]] for name in names])
-    covar = np.diag([row["sd_" + name] ** 2 for name in names])
+    mean = np.array([[row[name] / KM] for name in names])
+    covar = np.diag([(row["sd_" + name] / KM) ** 2 for name in names])
     state = GaussianState(mean, covar, timestamp=_time(float(row["time"])))
     return _cloud(state) if particles else state
 
@@ -253,7 +257,7 @@ def _rows(
         row["track"] = numbers.setdefault(track.id, len(numbers))
         mean = np.ravel(track[-1].mean).astype(float)[list(_ORDER)]
         row["time"], row["status"] = now, status
-        row["east"], row["north"], row["v_east"], row["v_north"] = mean
+        row["east"], row["north"], row["v_east"], row["v_north"] = mean * KM
     return table
 
 

@@ -116,7 +116,7 @@ def test_courses():
 
 @every
 @both
-@pytest.mark.parametrize("pushes", [1, 64])
+@pytest.mark.parametrize("pushes", [1, 16])
 def test_our_tracker_gets_every_return_once_and_in_its_own_scan(make, swept, pushes):
     scene = make(seed=5, swept=swept)
     parts = scenes.sectors(scene, pushes)
@@ -213,3 +213,45 @@ def test_tables_are_renewed_between_their_marks(tmp_path, capsys):
     report.publish({"growth": full}, file)
     assert file.read_text() == text
     assert "| 1 | 2 |" in capsys.readouterr().out
+
+
+class Recorder:
+    """Stands in for the tracker: keeps what it is told."""
+
+    def __init__(self, settings, radar, seed):
+        self.told = []
+        Recorder.last = self
+
+    def push(self, sector):
+        self.told.append(sector)
+        return sector
+
+    def flush(self):
+        return None
+
+
+class Adopting(Recorder):
+    def adopt(self, tracks):
+        self.told.append(tracks)
+
+
+def test_given_tracks_are_adopted_between_the_first_scan_and_the_second(monkeypatch):
+    scene = scenes.formation(2, seed=1, scans=3)
+    given = scenes.given_tracks(scene, 1)
+    monkeypatch.setattr(tracking, "Tracker", Adopting)
+    run = tracking.track(scene, {}, given, 4, 1)
+    told = Adopting.last.told
+    assert [isinstance(each, np.ndarray) for each in told] == [False] * 5 + [True] + [False] * 10
+    assert told[5] is given
+    assert not any(len(sector.centroids) for sector in told[:5])
+    assert told[4].stop == given["time"][0]
+    assert sum(len(sector.centroids) for sector in told[6:]) == np.count_nonzero(scene.returns["scan"] > 0)
+    assert len(run.cpu) == len(run.wall) == 3
+    assert run.rows["track"].tolist() == [0, 1]
+
+
+def test_a_tracker_that_cannot_adopt_is_skipped(monkeypatch):
+    scene = scenes.formation(2, seed=1, scans=3)
+    monkeypatch.setattr(tracking, "Tracker", Recorder)
+    assert tracking.track(scene, {}, scenes.given_tracks(scene, 1), 1, 1) is None
+    assert tracking.track(scene, {}, None, 1, 1) is not None
