@@ -153,7 +153,7 @@ def main(
         Path | None, typer.Option(help="Document whose tables `peers` and `steps` are renewed.")
     ] = None,
 ) -> None:
-    """Measure ours and the others."""
+    """Measure ours and the others on the same scans; what the results file has of the others is kept."""
     results = report.Results(json)
     lacking = missing()
     if lacking:
@@ -175,7 +175,11 @@ def main(
                 results.forget(case.title, label)
             there = {run["seed"] for run in results.of(case.title, label)}
             for seed in sorted(set(range(1, case.seeds + 1)) - there):
-                found = alone(measure_peer, case, name, seed)
+                try:
+                    found = alone(measure_peer, case, name, seed)
+                except Exception as error:  # theirs: the others go on, and it has no row
+                    report.say(f"{case.title}, {label}, seed {seed}: failed, {error!r}")
+                    continue
                 results.add(case.title, label, seed, found)
                 report.say(f"{case.title}, {label}, seed {seed}: {report.brief(found)}")
     steps = alone(filterpy_steps) | ({} if lacking else alone(stone_soup_steps))

@@ -219,7 +219,7 @@ def main(
         Path | None, typer.Option(help="Document whose tables `growth` and `accuracy` are renewed.")
     ] = None,
 ) -> None:
-    """Measure our tracker."""
+    """Measure our tracker: time, memory and accuracy, each run in a process of its own."""
     results = report.Results(json)
     for case in [*GROWTH, *ACCURACY]:
         if only not in case.title or (quick and not case.quick):
