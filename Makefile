@@ -42,13 +42,17 @@ format: $(READY) ## Rewrite the code in the house's format
 	@$(PYTHON) -m ruff check --fix .
 	@$(PYTHON) -m ruff format .
 
-BENCHMARKS = $(filter-out benchmarks/__init__.py benchmarks/acceptance.py,$(wildcard benchmarks/*.py))
+# The rest of benchmarks/ is what these share.
+BENCHMARKS = $(filter-out __init__ acceptance report scenes stone_soup tracking peers, \
+             $(basename $(notdir $(wildcard benchmarks/*.py))))
 
-bench: $(COMPILED) ## Measure everything that benchmarks/ measures on simulated radar
+bench: $(COMPILED) ## Measure everything; ours beside others where those are installed
 	@set -e; export QT_QPA_PLATFORM=offscreen; \
-	for file in $(BENCHMARKS); do echo "== $$file"; $(PYTHON) "$$file"; done; \
+	for name in $(BENCHMARKS); do echo "== benchmarks/$$name.py"; $(PYTHON) -m benchmarks.$$name; done; \
+	for name in tracking peers; do \
+	    echo "== benchmarks/$$name.py"; $(PYTHON) -m benchmarks.$$name --markdown docs/performance.md; done; \
 	echo "== benchmarks/acceptance.py scenario twenty-five"; \
-	$(PYTHON) benchmarks/acceptance.py scenario twenty-five
+	$(PYTHON) -m benchmarks.acceptance scenario twenty-five
 
 pictures: $(COMPILED) ## Make the pictures that README and docs show
 	@mkdir -p docs/pictures
@@ -62,6 +66,7 @@ LOCK = $(PYTHON) -m uv --no-config pip compile pyproject.toml --quiet --universa
 lock: $(READY) ## Bring the lock files up to pyproject.toml
 	@$(LOCK) -o requirements.lock
 	@$(LOCK) --group dev -o requirements-dev.lock
+	@$(LOCK) --extra bench --constraints requirements.lock -o requirements-bench.lock
 
 clean: ## Remove .venv and all caches
 	rm -rf .venv .mypy_cache .ruff_cache .pytest_cache .hypothesis .import_linter_cache build dist

@@ -16,7 +16,7 @@ import radar_console
 
 ROOT = Path(__file__).parents[1]
 PROJECT: dict[str, Any] = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
-LOCKS = ("requirements.lock", "requirements-dev.lock")
+LOCKS = ("requirements.lock", "requirements-dev.lock", "requirements-bench.lock")
 
 
 def locked(name: str) -> dict[str, Requirement]:
@@ -43,6 +43,8 @@ def test_a_lock_file_satisfies_what_the_project_asks_for(name: str) -> None:
     asked = declared(PROJECT["project"]["dependencies"])
     if name == "requirements-dev.lock":
         asked += declared(PROJECT["dependency-groups"]["dev"] + PROJECT["build-system"]["requires"])
+    if name == "requirements-bench.lock":
+        asked += declared(PROJECT["project"]["optional-dependencies"]["bench"])
     pins = locked(name)
     for requirement in asked:
         (exact,) = pins[canonicalize_name(requirement.name)].specifier
@@ -50,10 +52,11 @@ def test_a_lock_file_satisfies_what_the_project_asks_for(name: str) -> None:
         assert requirement.specifier.contains(exact.version), requirement
 
 
-def test_running_and_developing_use_the_same_versions() -> None:
-    run, develop = (locked(name) for name in LOCKS)
+@pytest.mark.parametrize("name", LOCKS[1:])
+def test_developing_and_measuring_use_the_versions_that_run(name: str) -> None:
+    run, other = locked(LOCKS[0]), locked(name)
     assert {name: str(pin.specifier) for name, pin in run.items()} == {
-        name: str(develop[name].specifier) for name in run
+        name: str(other[name].specifier) for name in run
     }
 
 

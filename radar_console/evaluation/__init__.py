@@ -1,1 +1,1 @@
-"""How good tracks and filters are: errors against the truth, and whether claimed errors are the real ones."""
+"""How good tracks and filters are: distances between sets, the story of each target, honest covariances."""

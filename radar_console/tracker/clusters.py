@@ -12,7 +12,7 @@ import numpy as np
 from numba import njit
 
 from radar_console.tracker import clutter, filters, gating, height, identity, management
-from radar_console.tracker.association import jpda
+from radar_console.tracker.association import choose, jpda
 from radar_console.tracker.records import (
     C_APPROXIMATE,
     C_FORCED,
@@ -25,7 +25,7 @@ from radar_console.tracker.records import (
     World,
 )
 
-_find, _solve, _BUDGET = jpda.find, jpda.solve, jpda.BUDGET
+_find, _solve, _BUDGET = jpda.find, choose.associate, jpda.BUDGET
 _advance, _log_likelihood, _update = filters.advance, filters.log_likelihood, filters.update
 _false_density, _MARGIN = clutter.false_density, gating.MARGIN
 _height_factor, _update_height, _identity_factor = height.factor, height.update, identity.factor
@@ -174,7 +174,7 @@ def _associate(lo: int, hi: int, w: World) -> None:
         for k in range(member.pairs, until):
             pair = w.pairs[k]
             plot = pool[pair.plot]
-            pair.w *= par.p_d / _false_density(plot, 0.0, par) * plot.weight * evidence(track, plot, par)
+            pair.w *= par.p_d / _false_density(track, plot, par) * plot.weight * evidence(track, plot, par)
             if pair.w > _PRUNE * miss[i]:
                 if plot.mark < 0:
                     plot.mark = plots
@@ -182,7 +182,7 @@ def _associate(lo: int, hi: int, w: World) -> None:
                 row[n], col[n], weight[n], kept[n] = i, plot.mark, pair.w, k
                 n += 1
     beta, beta_miss, rough = np.zeros(n), np.ones(m), np.zeros(m, np.bool_)
-    _solve(miss, plots, row[:n], col[:n], weight[:n], _BUDGET, beta, beta_miss, rough)
+    _solve(par.associator, miss, plots, row[:n], col[:n], weight[:n], _BUDGET, beta, beta_miss, rough)
     _cap(col, plots, kept, w, beta)
     total = miss
     for k in range(n):

@@ -3,9 +3,10 @@
 Every centroid counts with the part of it that no confirmed track has used. The map over range and
 azimuth forgets with a time constant of `1 / (1 - MEMORY)` turns; a cell's estimate is the mean of a
 gamma posterior, whose prior is the mean over the whole coverage, itself with the prior of one false
-centroid a turn. Clutter can be far smaller than a cell, and move: so the centroids of the last two
-turns within reach of a place are counted, and that count sharpens the map's estimate as another
-gamma posterior, with the map's as its prior.
+centroid a turn. Clutter can be far smaller than a cell, and move. So
+what lay around each centroid is counted, too: behind it in this turn, and all around it in the turn
+before; a young track adds up what it met on its way. The count sharpens the map's estimate, as a
+mixture of gamma posteriors: the place may have as much clutter as its cell, or many times more.
 """
 
 import math
@@ -14,13 +15,13 @@ from typing import Any
 import numpy as np
 from numba import njit
 
-from radar_console.tracker.records import N_PAST, N_POOL, World
+from radar_console.tracker.records import CONFIRMED, N_PAST, N_POOL, STARTER, World
 
 RINGS, COLUMNS = 32, 64
 MEMORY = 0.9
 PRIOR_TURNS = 0.5
-LOCAL_PRIOR = 0.5  # centroids that the map's estimate is worth
-LOCAL_TURNS = 2
+MULTIPLES = ((1.0, 0.8), (8.0, 0.15), (64.0, 0.05))  # of the map's density, and their probabilities
+TRACK_MEMORY = 0.9
 _TURN = 2.0 * math.pi
 _LEAST_DENSITY = 1e-15  # m⁻²
 
@@ -82,35 +83,51 @@ def estimate(clutter: Any, e: float, n: float, max_range: float) -> float:
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def survey(plot: Any, beam: Any, w: World) -> None:
-    """Count what lay around the place of a plot in the last turns."""
-    par, past = w.par, w.past
+    """Count what lay around the place of a plot lately, and keep the plot for those to come.
+
+    Of this turn only what the beam has met before it, a half of the disc, so that nothing depends
+    on how far the beam has got since.
+    """
+    par, past, size = w.par, w.past, w.size
     de, dn = plot.e - beam.e, plot.n - beam.n
     r = math.hypot(de, dn)
     rho = radius(r, par)
     half = math.asin(rho / r) if rho < r else math.pi
-    near, turns = 0.0, 0
-    for k in range(1, LOCAL_TURNS + 1):
-        middle = plot.phi - k * _TURN
-        if middle < w.clutter.first:
-            break
-        turns += 1
-        i = _first_from(past, w.size[N_PAST], middle - half)
-        while i < w.size[N_PAST] and past[i].phi <= middle + half:
-            e, n = past[i].e - plot.e, past[i].n - plot.n
-            if e * e + n * n <= rho * rho:
-                near += past[i].weight
-            i += 1
-    plot.near, plot.exposure = near, turns * math.pi * rho * rho
+    area = math.pi * rho * rho
+    plot.near = _count(plot, plot.phi - half, plot.phi, rho, w)
+    plot.exposure = 0.5 * area
+    plot.near_before = plot.exposure_before = 0.0
+    if plot.phi - _TURN >= w.clutter.first:
+        middle = plot.phi - _TURN
+        plot.near_before = _count(plot, middle - half, middle + half, rho, w)
+        plot.exposure_before = area
     plot.base = par.clutter
     if math.isnan(plot.base):
         plot.base = estimate(w.clutter, de, dn, par.max_range)
     plot.base = max(plot.base, _LEAST_DENSITY)
+    place = size[N_PAST]
+    past[place].phi, past[place].e, past[place].n = plot.phi, plot.e, plot.n
+    past[place].weight = 0.0 if plot.extended else 1.0
+    plot.past = place
+    size[N_PAST] += 1
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _count(plot: Any, begin: float, end: float, rho: float, w: World) -> float:
+    """Past centroids between two angles, within `rho` of a plot."""
+    past, near, i = w.past, 0.0, _first_from(w.past, w.size[N_PAST], begin)
+    while i < w.size[N_PAST] and past[i].phi <= end:
+        e, n = past[i].e - plot.e, past[i].n - plot.n
+        if e * e + n * n <= rho * rho:
+            near += past[i].weight
+        i += 1
+    return near
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def radius(r: float, par: Any) -> float:
-    """How far around a place at range `r` other centroids are counted: as far as a target moves in a turn."""
-    reach: float = par.max_speed * par.turn + math.hypot(par.sd_range, r * par.sd_azimuth)
+    """How far around a place at range `r` other centroids count: what a target moves in half a turn."""
+    reach: float = 0.5 * par.max_speed * par.turn + math.hypot(par.sd_range, r * par.sd_azimuth)
     return reach
 
 
@@ -128,37 +145,68 @@ def _first_from(past: Any, stop: int, phi: float) -> int:
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def false_density(plot: Any, own: float, par: Any) -> float:
-    """λ, m⁻² and turn, at a plot, for a track that `own` of the centroids around it belong to."""
+def false_density(track: Any, plot: Any, par: Any) -> float:
+    """λ, m⁻² and turn, at a plot in the gate of a track."""
     if not math.isnan(par.clutter):
         return float(plot.base)
-    density: float = (max(plot.near - own, 0.0) + LOCAL_PRIOR) / (plot.exposure + LOCAL_PRIOR / plot.base)
-    return density
+    near = track.near + plot.near + max(plot.near_before - _own(track, plot, par), 0.0)
+    return _sharpened(plot.base, near, track.exposure + plot.exposure + plot.exposure_before)
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def own(track: Any, par: Any) -> float:
-    """How many of the centroids that were counted around a young track's next plot are its own."""
-    known = float(track.history & 1)
-    if track.history & 2:
-        known += 2.0 * math.hypot(track.x[2], track.x[3]) < par.max_speed
-    return known
+def density_at(plot: Any, par: Any) -> float:
+    """λ, m⁻² and turn, at a plot that is nobody's."""
+    if not math.isnan(par.clutter):
+        return float(plot.base)
+    return _sharpened(plot.base, plot.near + plot.near_before, plot.exposure + plot.exposure_before)
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def remember(plot: Any, w: World) -> None:
-    """Keep a plot for the counts of the next turns; `w.past` has room."""
-    place = w.size[N_PAST]
-    past = w.past[place]
-    past.phi, past.e, past.n, past.weight = plot.phi, plot.e, plot.n, 0.0 if plot.extended else 1.0
-    plot.past = place
-    w.size[N_PAST] += 1
+def _sharpened(base: float, near: float, exposure: float) -> float:
+    """The posterior mean, having counted `near` in `exposure` m² and turns.
+
+    The prior is a mixture of exponentials with means that are multiples of `base`; n then has a
+    geometric distribution under each of them.
+    """
+    total, mean = 0.0, 0.0
+    for multiple, probability in MULTIPLES:
+        x = multiple * base * exposure
+        weight = probability / (1.0 + x)
+        if near > 0.0:
+            weight *= math.exp(near * math.log(x / (1.0 + x))) if x > 0.0 else 0.0
+        total += weight
+        mean += weight * (near + 1.0) / (exposure + 1.0 / (multiple * base))
+    density: float = mean / total if total > 0.0 else (near + 1.0) / exposure
+    return max(density, _LEAST_DENSITY)
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _own(track: Any, plot: Any, par: Any) -> float:
+    """1 if the plot of the track's last pass is among those around `plot`.
+
+    What a confirmed track has used does not count as clutter to begin with.
+    """
+    if not track.history & 1 or track.level == CONFIRMED:
+        return 0.0
+    if track.level == STARTER:
+        moved = math.hypot(plot.e - track.x[0], plot.n - track.x[1])
+    else:
+        moved = math.hypot(track.x[2], track.x[3]) * par.turn
+    return 1.0 if moved < radius(math.hypot(plot.e - plot.s_e, plot.n - plot.s_n), par) else 0.0
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def gather(track: Any, plot: Any, par: Any) -> None:
+    """Add what lay around a track's plot a turn ago to what the track has met; before it is served."""
+    near = max(plot.near_before - _own(track, plot, par), 0.0)
+    track.near = TRACK_MEMORY * (track.near + near)
+    track.exposure = TRACK_MEMORY * (track.exposure + plot.exposure_before)
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def forget(phi: float, w: World) -> None:
     """Drop what the counts need no more, once it is the better part of what is kept."""
-    size, oldest = w.size, phi - (LOCAL_TURNS + 0.5) * _TURN
+    size, oldest = w.size, phi - (1.5) * _TURN
     drop = _first_from(w.past, size[N_PAST], oldest)
     for p in range(size[N_POOL]):
         drop = min(drop, w.pool[p].past)

@@ -7,7 +7,7 @@ import numpy as np
 from numba import njit
 
 from radar_console.core.messages import TrackStatus
-from radar_console.tracker import filters, gating, height, identity
+from radar_console.tracker import clutter, filters, gating, height, identity
 from radar_console.tracker.records import (
     AUTO,
     BRANCHING,
@@ -30,6 +30,7 @@ from radar_console.tracker.records import (
 )
 
 _wrap, _too_fast, _start_belief, _predicted = gating.wrap, gating.too_fast, filters.start, gating.predicted
+_gather = clutter.gather
 _height, _begin_height, _learn = height.predicted, height.begin, identity.learn
 _TURN = 2.0 * math.pi
 FIRST_SCORE = math.log(0.1 / 0.9)  # one plot in ten is a new target's
@@ -70,6 +71,7 @@ def begin(plot: Any, dense: bool, w: World) -> None:
     track.last, track.previous = plot.ordinal, -1
     track.slot, track.place, track.first = -1, -1, -1
     track.mode_3a, track.agreed, track.address = plot.mode_3a, 1, plot.address
+    track.near = track.exposure = 0.0
     _begin_height(track, plot)
     track.dense, track.voiced = dense, True
     track.swept = track.served = track.dead = track.claims = track.proven = False
@@ -106,6 +108,8 @@ def serve(
         w.tally[C_BLANKED] += 1
         return
     track.passes += 1
+    if seen:
+        _gather(track, plot, par)
     track.history = ((track.history << 1) | (1 if hit else 0)) & ((1 << par.confirm_passes) - 1)
     track.misses = 0 if hit else track.misses + 1
     if seen:
@@ -167,6 +171,20 @@ def confirm(index: int, plot: Any, beam: Any, w: World) -> None:
     report(track, _CONFIRMED, True, True, plot, track.probability, False, track.t, w)
     _start_belief(track, beam.e, beam.n, w.par, w.belief)
     w.tally[C_CONFIRMED] += 1
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def adopt(index: int, sensor_e: float, sensor_n: float, w: World) -> None:
+    """Have the filter take over a track whose moments are given."""
+    track, par = w.tracks[index], w.par
+    track.curve[0] = track.curve[1] = track.growth[1] = 0.0
+    track.growth[0] = track.growth[2] = par.q / 3.0
+    track.level, track.slot = CONFIRMED, w.size[N_SLOTS]
+    w.belief.owner[track.slot] = index
+    w.wake[index] = -math.inf
+    w.size[N_SLOTS] += 1
+    w.size[N_TRACKS] += 1
+    _start_belief(track, sensor_e, sensor_n, par, w.belief)
 
 
 @njit(cache=True, nogil=True, error_model="numpy")

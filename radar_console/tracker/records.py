@@ -44,6 +44,8 @@ STATE = np.dtype(
         ("agreed", "i8"),  # hits in a row whose identity was the track's own
         ("place", "i8"),  # in the list of open tracks
         ("first", "i8"),  # of its edges in this bin; -1 none
+        ("near", "f8"),  # false centroids that it met around its plots,
+        ("exposure", "f8"),  # and m² and turns where they were counted
         ("dense", "?"),  # it was born in dense clutter
         ("voiced", "?"),  # of the branches of one first plot one is reported
         ("proven", "?"),  # to be confirmed when all who claim its last plot are served
@@ -82,8 +84,10 @@ PENDING = np.dtype(
         ("awaited", "?"),  # an open confirmed track claims it
         ("mark", "i8"),  # scratch: first claimant, or column of a cluster
         ("head", "i8"),  # scratch: first of its edges
-        ("near", "f8"),  # centroids around it in the last turns, less what confirmed tracks used
-        ("exposure", "f8"),  # m² and turn, where they were counted
+        ("near", "f8"),  # centroids around it that came before it in this turn,
+        ("exposure", "f8"),  # and m² where they were counted
+        ("near_before", "f8"),  # those of the turn before, less what confirmed tracks used
+        ("exposure_before", "f8"),
         ("base", "f8"),  # m⁻², density of false centroids by the map
         ("past", "i8"),  # its row among the past centroids
     ]

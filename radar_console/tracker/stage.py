@@ -23,7 +23,9 @@ from radar_console.estimation.measurement import from_polar
 from radar_console.estimation.particle import normals
 from radar_console.scenario import TrackerSettings
 from radar_console.tracker import clutter, gating
+from radar_console.tracker.association.choose import KINDS
 from radar_console.tracker.clusters import associate, step, weigh
+from radar_console.tracker.management import adopt
 from radar_console.tracker.records import (
     BEAM,
     EDGE,
@@ -108,7 +110,6 @@ class Tracker:
         self._log = _BeamLog()
         self._next_bin: int | None = None
         self._last: Sector | None = None
-        self._adopted: list[Table] = []
         self._threads = min(os.cpu_count() or 1, _MOST_THREADS) if threads is None else threads
         self._pool: ThreadPoolExecutor | None = None
 
@@ -136,6 +137,42 @@ class Tracker:
             self._take(sector)
         self._last = sector
         return sector.adding(tracks=self._run(min(sector.complete, self._log.angle[-1]), final=False))
+
+    def adopt(self, tracks: Table) -> None:
+        """Go on with tracks from elsewhere, as confirmed ones, from the last sector on.
+
+        Parameters
+        ----------
+        tracks : TRACK  their numbers, times, positions, velocities and standard deviations
+
+        Raises
+        ------
+        ValueError      no sector has said yet where the beam is
+        """
+        if self._last is None:
+            raise ValueError("expected a sector before tracks are adopted")
+        need = self._world.need
+        need[:] = self._world.size
+        need[N_TRACKS] += len(tracks)
+        need[N_SLOTS] += len(tracks)
+        self._world = _grown(self._world)
+        world, first = self._world, int(self._world.size[N_TRACKS])
+        rows = world.tracks[first : first + len(tracks)]
+        rows[:] = np.zeros(1, STATE)
+        rows["id"], rows["born"], rows["t"] = tracks["track"], tracks["born"], tracks["time"]
+        for i, name in enumerate(("east", "north", "v_east", "v_north")):
+            rows["x"][:, i], rows["P"][:, i, i] = tracks[name], tracks["sd_" + name] ** 2
+        rows["up"] = np.nan
+        rows["sd_range"], rows["sd_azimuth"] = self.radar.sd_range, self.radar.sd_azimuth
+        beam, (east, north, _) = float(self._log.angle[-1]), self._last.position
+        azimuth = np.arctan2(tracks["east"] - east, tracks["north"] - north)
+        rows["psi"] = beam - np.mod(beam - azimuth, TURN)
+        rows["score"] = rows["peak"] = self.settings.confirm_score
+        rows["last"] = rows["previous"] = rows["first"] = rows["mode_3a"] = rows["address"] = -1
+        rows["hits"] = rows["passes"] = self.settings.confirm_hits
+        rows["history"], rows["voiced"] = 1, True
+        for k in range(len(tracks)):
+            adopt(first + k, east, north, world)
 
     def flush(self) -> Sector | None:
         """What is pending at the end of a stream, as one more sector; None if there is nothing."""
@@ -357,7 +394,7 @@ def _parameters(settings: TrackerSettings, radar: Radar, seed: int) -> NDArray[n
         "sd_range": radar.sd_range,
         "sd_azimuth": radar.sd_azimuth,
         "up_q": _CLIMB_NOISE,
-        "associator": 0,
+        "associator": KINDS[settings.associator],
         "rectangle": settings.gate == "rectangle",
         "initiation": _INITIATIONS.index(settings.initiation),
         "identity": settings.identity == "use",

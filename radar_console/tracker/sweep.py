@@ -37,7 +37,7 @@ _serve_members, _settle_young, _retire, _purge = (
     youth.purge,
 )
 _bury, _turn_to = management.bury, clutter.turn_to
-_survey, _remember, _forget = clutter.survey, clutter.remember, clutter.forget
+_survey, _forget = clutter.survey, clutter.forget
 
 _OPENED = 1
 
@@ -174,8 +174,6 @@ def _gate(beam: Any, queue: Any, w: World) -> bool:
     for k in range(n):
         w.pool[first + k] = fresh[k]
         _survey(w.pool[first + k], beam, w)
-    for k in range(n):
-        _remember(w.pool[first + k], w)
     size[N_POOL], size[N_EDGES], size[N_QUEUE] = first + n, count, stop
     for place in range(opened):
         track = w.tracks[w.opened[place]]

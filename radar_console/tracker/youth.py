@@ -37,7 +37,7 @@ from radar_console.tracker.records import (
 
 _BROAD = particle.BROAD
 _density_of, _MARGIN, _place = gating.density_of, gating.MARGIN, clutter.place
-_false_density, _own, _radius = clutter.false_density, clutter.own, clutter.radius
+_false_density, _density_at = clutter.false_density, clutter.density_at
 _evidence, _update_height = clusters.evidence, height.update
 _serve, _begin, _kill, _report = management.serve, management.begin, management.kill, management.report
 _confirm = management.confirm
@@ -92,13 +92,12 @@ def _settle_tentative(index: int, beam: Any, w: World) -> None:
         _serve(index, False, False, pool[0], math.nan, False, beam, w)
         return
     beta, chosen = np.empty(count), np.empty(count, np.int64)
-    own = _own(track, par)
     n, total, best, k = 0, miss, -1, track.first
     while k >= 0:
         plot = pool[edges[k].plot]
         # A plot that a confirmed track still waits for is left to it.
         if plot.weight > 0.0 and not plot.awaited:
-            weight = par.p_d / _false_density(plot, own, par) * edges[k].density
+            weight = par.p_d / _false_density(track, plot, par) * edges[k].density
             weight *= plot.weight * _evidence(track, plot, par)
             if weight > _PRUNE * miss:
                 beta[n], chosen[n] = weight, edges[k].plot
@@ -157,12 +156,11 @@ def _settle_starter(index: int, beam: Any, w: World) -> None:
     """
     tracks, pool, edges, par = w.tracks, w.pool, w.edges, w.par
     track = tracks[index]
-    own = _own(track, par)
     best, value, k = -1, 0.0, track.first
     while k >= 0:
         plot = pool[edges[k].plot]
         if plot.weight >= 0.5 and not plot.awaited:
-            weight = par.p_d / _false_density(plot, own, par) * edges[k].density
+            weight = par.p_d / _false_density(track, plot, par) * edges[k].density
             weight *= _evidence(track, plot, par)
             if weight > value:
                 best, value = k, weight
@@ -174,7 +172,7 @@ def _settle_starter(index: int, beam: Any, w: World) -> None:
         while k >= 0:
             plot = pool[edges[k].plot]
             if k != best and plot.weight >= 0.5 and not plot.awaited:
-                weight = par.p_d / _false_density(plot, own, par) * edges[k].density
+                weight = par.p_d / _false_density(track, plot, par) * edges[k].density
                 weight *= _evidence(track, plot, par)
                 if weight > _PRUNE * miss:
                     _branch(index, k, weight, False, beam, w)
@@ -346,8 +344,8 @@ def _start(plot: Any, free: bool, beam: Any, w: World) -> None:
     w.clutter.fresh[ring, column] += plot.weight
     w.past[plot.past].weight = plot.weight
     if free and plot.weight >= 0.5:
-        rho = _radius(math.hypot(e, n), par)
-        crowd = _false_density(plot, 0.0, par) * math.pi * rho * rho
+        reach = par.max_speed * par.turn
+        crowd = _density_at(plot, par) * math.pi * reach * reach
         _begin(plot, crowd > _DENSE, w)
         w.tally[C_STARTED] += 1
 

@@ -1,0 +1,48 @@
+"""The optimal sub-pattern assignment metric between two sets of points [1].
+
+[1] Schuhmacher, Vo, Vo, A consistent metric for performance evaluation of multi-object filters,
+    IEEE Transactions on Signal Processing 56 (8), 2008.
+"""
+
+from typing import NamedTuple
+
+from numpy.typing import ArrayLike
+
+from radar_console.evaluation.gospa import gospa
+
+
+class Ospa(NamedTuple):
+    """An OSPA distance and its parts, m: value^p = location^p + cardinality^p [1, §IV]."""
+
+    value: float
+    location: float
+    cardinality: float
+
+    def __float__(self) -> float:
+        return self.value
+
+
+def ospa(truth: ArrayLike, estimates: ArrayLike, c: float, p: float = 2.0) -> Ospa:
+    """OSPA between the true and the estimated positions [1, (3)]: an error per object, at most c.
+
+    It is GOSPA with α = 1 averaged over the larger set. Two empty sets are 0 apart, an empty one and
+    any other `c`.
+
+    Parameters
+    ----------
+    truth : (n, d) m
+    estimates : (m, d) m
+    c : cut-off distance, m, > 0
+    p : exponent, ≥ 1
+
+    Raises
+    ------
+    ValueError         as `gospa`
+    """
+    whole = gospa(truth, estimates, c, p, alpha=1.0)
+    n, m = whole.assigned + whole.missed_count, whole.assigned + whole.false_count
+    larger = max(n, m, 1)
+    cardinality = abs(n - m) / larger
+    value = whole.value / larger ** (1.0 / p)
+    location = max((value / c) ** p - cardinality, 0.0)
+    return Ospa(value, c * location ** (1.0 / p), c * cardinality ** (1.0 / p))
