@@ -26,7 +26,7 @@ _measure, _invert, _log_density = innovation.measure, innovation.invert, innovat
 _BROAD = particle.BROAD
 
 _MOST_SWITCHING = 0.5  # mean number of switches in one step of the prediction
-_MOST_STEPS = 64
+_MOST_STEPS = 1000
 _LEAST_MODE = 1e-9
 _LEAST_GROWTH = 1e-3  # of the growth by q
 

@@ -19,7 +19,8 @@ from radar_console.estimation.gaussian import Array
 from radar_console.tracker.records import CA, CT, IMM, PARTICLE, SINGER, UNSCENTED
 
 _ALMOST_STRAIGHT = 1e-3  # rad: below, series that are exact to 1e-13
-_SLOW_DECAY = 0.1  # T/τ: below, Singer's closed forms lose digits
+_STEADY = 1e-4  # T/τ: below, series that are exact to 1e-13
+_SLOW_DECAY = 0.1  # T/τ: below, the closed forms of Singer's noise lose digits
 _MOST = 1e14, 1e10, 1e6, 1e2  # m², m²/s², m²/s⁴, rad²/s²: variances that say no more than "anywhere"
 
 
@@ -101,12 +102,9 @@ def _accelerate(x: Array, P: Array, T: float, tau: float) -> None:
     """Acceleration that decays with the time constant `tau`, [1, (8.2.2-6)]; constant if infinite."""
     y = T / tau
     rho = math.exp(-y)
-    if y < _SLOW_DECAY:
-        to_v = T * (1.0 - y / 2.0 * (1.0 - y / 3.0 * (1.0 - y / 4.0 * (1.0 - y / 5.0))))
-        to_p = 0.5 * T * T * (1.0 - y / 3.0 * (1.0 - y / 4.0 * (1.0 - y / 5.0 * (1.0 - y / 6.0))))
-    else:
-        to_v = (1.0 - rho) * tau
-        to_p = (y - 1.0 + rho) * tau * tau
+    chord = -math.expm1(-y) / y if y > _STEADY else 1.0 - y / 2.0 + y * y / 6.0
+    to_v = T * chord
+    to_p = T * T * ((1.0 - chord) / y if y > _STEADY else 0.5 - y / 6.0 + y * y / 24.0)
     for p in range(2):
         v, a = p + 2, p + 4
         x[p] += T * x[v] + to_p * x[a]
