@@ -53,6 +53,8 @@ def measure(
         R[2, 2] = sd * sd
         R[0, 2] = R[1, 2] = R[2, 0] = R[2, 1] = 0.0
         factor = math.log(2.0 * par.max_speed)
+        if par.filter != UNSCENTED:
+            R[2, 2] += _curvature(x, P, spread, y_e * y_e + y_n * y_n)
     if far and par.filter in (EXTENDED, UNSCENTED):
         R[0, 0], R[1, 1] = plot.sd_range * plot.sd_range, plot.sd_azimuth * plot.sd_azimuth
         R[0, 1] = R[1, 0] = 0.0
@@ -65,6 +67,14 @@ def measure(
         R[0, 0], R[0, 1], R[1, 0], R[1, 1] = plot.ee, plot.en, plot.en, plot.nn
         _linearised(x, P, plot, lag, y_e, y_n, m, False, nu, Y, C)
     return m, factor
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _curvature(x: Array, P: Array, spread: float, r2: float) -> float:
+    """Bound on the variance of what the Doppler's linearisation leaves out [1, (10.3.2-14)], m²/s²."""
+    speed2, speeds = x[2] * x[2] + x[3] * x[3], P[2, 2] + P[3, 3]
+    variance: float = spread * (speeds + speed2 * spread / r2) / r2
+    return variance
 
 
 @njit(cache=True, nogil=True, error_model="numpy")

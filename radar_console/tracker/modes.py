@@ -16,7 +16,7 @@ import numpy as np
 from numba import njit
 
 from radar_console.estimation.gaussian import Array
-from radar_console.tracker.records import CA, CT, IMM, PARTICLE, SINGER, UNSCENTED
+from radar_console.tracker.records import CA, CT, EXTENDED, IMM, PARTICLE, SINGER
 
 _ALMOST_STRAIGHT = 1e-3  # rad: below, series that are exact to 1e-13
 _STEADY = 1e-4  # T/τ: below, series that are exact to 1e-13
@@ -58,10 +58,10 @@ def prior_variance(i: int, n: int, par: Any) -> float:
 def predict(model: int, x: Array, P: Array, T: float, par: Any) -> None:
     """Propagate x (n,) and P (n, n) over `T` > 0 s by the motion `model` with its process noise."""
     if model == CT:
-        if par.filter == UNSCENTED:
-            _turn_unscented(x, P, T)
-        else:
+        if par.filter == EXTENDED:
             _turn(x, P, T)
+        else:
+            _turn_unscented(x, P, T)
         _turn_noise(x, P, T, par)
     elif model in (CA, SINGER):
         _accelerate(x, P, T, math.inf if model == CA else par.manoeuvre_time)
@@ -207,29 +207,34 @@ def _turn(x: Array, P: Array, T: float) -> None:
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def _turn_unscented(x: Array, P: Array, T: float) -> None:
-    """The same by 2n sigma points of equal weight [2]: P stays positive semidefinite."""
-    n = x.size
-    points = np.empty((2 * n, n))
-    sigma_points(x, P, points)
-    mean = np.zeros(n)
-    for k in range(2 * n):
+    """The same by sigma points: the mean bends with the spread of ω, and P stays positive semidefinite."""
+    own = np.array([0, 1, 2, 3, x.size - 1])  # an acceleration is another model's
+    part, cov, points = np.empty(5), np.empty((5, 5)), np.empty((10, 5))
+    for i in range(5):
+        part[i] = x[own[i]]
+        for j in range(5):
+            cov[i, j] = P[own[i], own[j]]
+    sigma_points(part, cov, points)
+    for k in range(10):
         row = points[k]
-        along, aside = _chord(row[n - 1] * T)
-        s, c = math.sin(row[n - 1] * T), math.cos(row[n - 1] * T)
-        ve, vn = row[2], row[3]
+        theta, ve, vn = row[4] * T, row[2], row[3]
+        along, aside = _chord(theta)
+        s, c = math.sin(theta), math.cos(theta)
         row[0] += T * (along * ve - aside * vn)
         row[1] += T * (aside * ve + along * vn)
         row[2], row[3] = c * ve - s * vn, s * ve + c * vn
-        for i in range(n):
-            mean[i] += row[i] / (2 * n)
-    for i in range(n):
-        x[i] = mean[i]
+    for i in range(4):
+        mean = 0.0
+        for k in range(10):
+            mean += points[k, i] / 10.0
+        x[i] = mean
+    for i in range(5):
         for j in range(i + 1):
             total = 0.0
-            for k in range(2 * n):
-                total += (points[k, i] - mean[i]) * (points[k, j] - mean[j])
-            P[i, j] = total / (2 * n)
-            P[j, i] = P[i, j]
+            for k in range(10):
+                total += (points[k, i] - x[own[i]]) * (points[k, j] - x[own[j]])
+            P[own[i], own[j]] = total / 10.0
+            P[own[j], own[i]] = total / 10.0
 
 
 @njit(cache=True, nogil=True, error_model="numpy")

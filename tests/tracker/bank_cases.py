@@ -13,6 +13,8 @@ from radar_console.tracker.records import PENDING, STATE, Belief
 
 RADAR = Radar("test", rotation=4.0, max_range=300e3, sd_range=50.0, sd_azimuth=math.radians(0.1))
 
+NORMALS = particle.normals()
+
 FILTERS = {
     "kalman": {"filter": "kalman"},
     "extended": {"filter": "extended"},
@@ -41,7 +43,7 @@ def empty_belief(par, slots=1):
         np.zeros((slots, r, n)),
         np.zeros((slots, r, n, n)),
         np.zeros((slots, r)),
-        particle.normals(),
+        NORMALS,
     )
 
 
