@@ -249,17 +249,19 @@ def _turn_noise(x: Array, P: Array, T: float, par: Any) -> None:
 def sigma_points(x: Array, P: Array, points: Array) -> None:
     """Fill `points` (2n, n) with x ± √n times the columns of P's root.
 
-    These are the unscented transform's points for κ = 0, whose central one has no weight; a singular
-    P is taken as the nearest one that is not.
+    These are the unscented transform's points for κ = 0, whose central one has no weight [2]; a
+    singular P is taken as the nearest one that is not. The root is upper triangular: a turn rate, the
+    last component, varies in one pair of points only, and the others turn all alike. So a turn's
+    moments do not depend on where north is.
     """
     n = x.size
     L = np.zeros((n, n))
-    for j in range(n):
-        for i in range(j, n):
+    for j in range(n - 1, -1, -1):
+        for i in range(j, -1, -1):
             s = P[i, j]
-            for k in range(j):
+            for k in range(j + 1, n):
                 s -= L[i, k] * L[j, k]
-            if i > j:
+            if i < j:
                 L[i, j] = s / L[j, j]
             else:
                 L[j, j] = math.sqrt(max(s, 1e-12 * P[j, j], 1e-18))
