@@ -5,9 +5,12 @@ from typing import Any
 
 from numba import njit
 
+from radar_console.tracker.records import STARTER
+
 MARGIN = math.radians(0.05)
 _TURN = 2.0 * math.pi
 _SPEED_SIGMAS = 2.0
+_SURE_SIGMAS = 4.5
 
 
 def threshold(probability: float) -> float:
@@ -22,31 +25,38 @@ def wrap(angle: float) -> float:
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def predicted(track: Any, T: float, q: float) -> tuple[float, float, float, float, float]:
-    """Position `T` s after the track's time, and its covariance ee, en, nn."""
-    x, P = track.x, track.P
-    noise = q * T * T * T / 3.0
+def predicted(track: Any, T: float) -> tuple[float, float, float, float, float]:
+    """The forecast: position `T` s after the track's time, and its covariance ee, en, nn.
+
+    What the filter expects of the target's acceleration is in the track's `curve`, and how the
+    position's covariance grows beyond that of a straight flight in its `growth`, times T³. For
+    nearly constant velocity that is exact, with q/3; other filters fit both to their own
+    prediction one turn ahead.
+    """
+    x, P, curve, growth = track.x, track.P, track.curve, track.growth
+    T2, T3 = T * T, T * T * T
     return (
-        x[0] + T * x[2],
-        x[1] + T * x[3],
-        P[0, 0] + 2.0 * T * P[0, 2] + T * T * P[2, 2] + noise,
-        P[0, 1] + T * (P[0, 3] + P[1, 2]) + T * T * P[2, 3],
-        P[1, 1] + 2.0 * T * P[1, 3] + T * T * P[3, 3] + noise,
+        x[0] + T * x[2] + 0.5 * T2 * curve[0],
+        x[1] + T * x[3] + 0.5 * T2 * curve[1],
+        P[0, 0] + 2.0 * T * P[0, 2] + T2 * P[2, 2] + T3 * growth[0],
+        P[0, 1] + T * (P[0, 3] + P[1, 2]) + T2 * P[2, 3] + T3 * growth[1],
+        P[1, 1] + 2.0 * T * P[1, 3] + T2 * P[3, 3] + T3 * growth[2],
     )
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def half_width(
+def extent(
     de: float, dn: float, ee: float, en: float, nn: float, sd_range: float, sd_azimuth: float, gamma: float
-) -> float:
-    """Angle between the line of sight to a gate's centre and the farther of its two tangents.
+) -> tuple[float, float]:
+    """How far a gate reaches, seen from the radar: half its width, rad, and half its depth, m.
 
     The gate is the ellipse dᵀ S⁻¹ d ≤ γ about (de, dn), where S is the covariance and a polar
-    measurement's together; π where it contains the radar, or reaches around it.
+    measurement's together. The width is the larger angle of its two tangents with the line of
+    sight; π where the ellipse contains the radar, or reaches around it.
     """
     r2 = de * de + dn * dn
     if r2 == 0.0:
-        return math.pi
+        return math.pi, math.inf
     r = math.sqrt(r2)
     u_e, u_n = de / r, dn / r
     uu = gamma * (u_e * u_e * ee + 2.0 * u_e * u_n * en + u_n * u_n * nn + sd_range * sd_range)
@@ -54,34 +64,46 @@ def half_width(
     uw = gamma * (u_e * u_n * (ee - nn) + (u_n * u_n - u_e * u_e) * en)
     # A line at angle θ touches the ellipse where (r² - uu) tan²θ + 2 uw tanθ - ww = 0.
     if r2 <= 1.000001 * uu:
-        return math.pi
-    return math.atan((abs(uw) + math.sqrt(uw * uw + (r2 - uu) * ww)) / (r2 - uu))
+        return math.pi, math.inf
+    width = math.atan((abs(uw) + math.sqrt(uw * uw + (r2 - uu) * ww)) / (r2 - uu))
+    along = math.sqrt(uu)
+    return width, along + 0.5 * ww / (r - along)
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def look(track: Any, starter: bool, beam: Any, par: Any) -> None:
-    """Set the track's beam phase, its gate's half-width, and until when it can sleep."""
+def look(track: Any, wake: Any, beam: Any, par: Any) -> None:
+    """Set the track's beam phase, its gate's extent, and until when it can sleep: `wake` (2,)."""
     T = max(beam.t - track.t, 0.0)
-    e, n, ee, en, nn = predicted(track, T, par.q)
+    e, n, ee, en, nn = predicted(track, T)
     de, dn = e - beam.e, n - beam.n
     track.rho = beam.phi - track.psi - _TURN - wrap(math.atan2(de, dn) - track.psi)
-    h = half_width(de, dn, ee, en, nn, track.sd_range, track.sd_azimuth, par.gate)
+    gamma = 2.0 * par.gate if par.rectangle else par.gate  # of the ellipse around the rectangle
+    h, along = extent(de, dn, ee, en, nn, track.sd_range, track.sd_azimuth, gamma)
     r = math.hypot(de, dn)
-    if starter:
+    if track.level == STARTER:
         noise = track.sd_range * track.sd_range + (r * track.sd_azimuth) ** 2
         reach = start_reach(track, T, noise, par)
         if reach < r:
             h = min(h, math.asin(reach / r))
-    track.half_width = h
+            along = min(along, reach)
+    track.half_width, track.along = h, along
     ahead = -h - MARGIN - track.rho
     if ahead <= 0.0 or h == math.pi or track.claims:
-        track.wake_angle = -math.inf
+        wake[0] = wake[1] = -math.inf
         return
     # Half of what is ahead is left to the target's motion, and to the growth of its gate.
     x, P = track.x, track.P
     speed = math.hypot(x[2], x[3]) + 10.0 * math.sqrt(P[2, 2] + P[3, 3]) + par.max_speed
-    track.wake_angle = beam.phi + 0.5 * ahead
-    track.wake_time = beam.t + min(0.25 * ahead, 0.5) * r / speed
+    wake[0] = beam.phi + 0.5 * ahead
+    wake[1] = beam.t + min(0.25 * ahead, 0.5) * r / speed
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def drift(track: Any, lag: float) -> float:
+    """How far the track's gate can move in `lag` s, m."""
+    x, P = track.x, track.P
+    speed: float = math.hypot(x[2], x[3]) + _SURE_SIGMAS * math.sqrt(P[2, 2] + P[3, 3])
+    return lag * speed
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -101,31 +123,40 @@ def too_fast(track: Any, par: Any) -> bool:
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def density_of(track: Any, T: float, plot: Any, scale: float, q: float) -> float:
+def innovation(track: Any, T: float, plot: Any, scale: float) -> tuple[float, float, float, float, float]:
+    """Innovation de, dn of a plot `T` s after the track's time, and S; the plot's noise times `scale`."""
+    e, n, ee, en, nn = predicted(track, T)
+    return plot.e - e, plot.n - n, ee + scale * plot.ee, en + scale * plot.en, nn + scale * plot.nn
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def density_of(track: Any, T: float, plot: Any, scale: float) -> float:
     """N(z; ẑ, S), m⁻², of a plot `T` s after the track's time, its covariance times `scale`."""
-    e, n, ee, en, nn = predicted(track, T, q)
-    ee += scale * plot.ee
-    en += scale * plot.en
-    nn += scale * plot.nn
-    de, dn = plot.e - e, plot.n - n
+    de, dn, ee, en, nn = innovation(track, T, plot, scale)
     det = ee * nn - en * en
     d2 = (nn * de * de - 2.0 * en * de * dn + ee * dn * dn) / det
     return math.exp(-0.5 * d2) / (_TURN * math.sqrt(det))
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def density(track: Any, starter: bool, plot: Any, par: Any) -> float:
+def density(track: Any, plot: Any, par: Any) -> float:
     """Gaussian likelihood of the plot, m⁻², predicted to its own time; 0 outside the gate."""
     T = max(plot.t - track.t, 0.0)
-    e, n, ee, en, nn = predicted(track, T, par.q)
-    ee += plot.ee
-    en += plot.en
-    nn += plot.nn
-    de, dn = plot.e - e, plot.n - n
+    de, dn, ee, en, nn = innovation(track, T, plot, 1.0)
     det = ee * nn - en * en
     d2 = (nn * de * de - 2.0 * en * de * dn + ee * dn * dn) / det
-    if not d2 <= par.gate:
+    if par.rectangle:
+        # Along and across the line of sight.
+        s_e, s_n = plot.e - plot.s_e, plot.n - plot.s_n
+        r = max(math.hypot(s_e, s_n), 1e-9)
+        u_e, u_n = s_e / r, s_n / r
+        uu = u_e * u_e * ee + 2.0 * u_e * u_n * en + u_n * u_n * nn
+        ww = u_n * u_n * ee - 2.0 * u_e * u_n * en + u_e * u_e * nn
+        along, across = u_e * de + u_n * dn, u_n * de - u_e * dn
+        if not (along * along <= par.gate * uu and across * across <= par.gate * ww):
+            return 0.0
+    elif not d2 <= par.gate:
         return 0.0
-    if starter and math.hypot(de, dn) > start_reach(track, T, plot.ee + plot.nn, par):
+    if track.level == STARTER and math.hypot(de, dn) > start_reach(track, T, plot.ee + plot.nn, par):
         return 0.0
-    return math.exp(-0.5 * d2) / (_TURN * math.sqrt(det))
+    return max(math.exp(-0.5 * d2), 1e-300) / (_TURN * math.sqrt(det))

@@ -7,39 +7,51 @@ import numpy as np
 from numba import njit
 
 from radar_console.core.messages import TrackStatus
-from radar_console.estimation.kalman import predict_in_place
-from radar_console.tracker import filters, gating
+from radar_console.tracker import filters, gating, height, identity
 from radar_console.tracker.records import (
+    AUTO,
+    BRANCHING,
     C_BLANKED,
     C_CONFIRMED,
     C_DELETED,
     C_LOST,
     CONFIRMED,
+    M_OF_N,
+    N_DEAD,
     N_EDGES,
     N_ROWS,
     N_SLOTS,
     N_TRACKS,
+    SCORE,
     STARTER,
     TENTATIVE,
     Belief,
+    World,
 )
 
-_wrap, _too_fast, _start_belief = gating.wrap, gating.too_fast, filters.start
+_wrap, _too_fast, _start_belief, _predicted = gating.wrap, gating.too_fast, filters.start, gating.predicted
+_height, _begin_height, _learn = height.predicted, height.begin, identity.learn
 _TURN = 2.0 * math.pi
-_FIRST_SCORE = math.log(0.1 / 0.9)  # one plot in ten is a new target's
+FIRST_SCORE = math.log(0.1 / 0.9)  # one plot in ten is a new target's
+_FIRST_SCORE = FIRST_SCORE
+_DROP = 4.6  # of the score from its peak, after which a young track is given up: odds of 1 to 100
+_DENSER = math.log(10.0)  # what dense clutter adds to the score that confirms
+_LEAST_HITS = 3
 _TENTATIVE, _CONFIRMED = int(TrackStatus.TENTATIVE), int(TrackStatus.CONFIRMED)
 _COASTING, _DELETED = int(TrackStatus.COASTING), int(TrackStatus.DELETED)
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def begin(tracks: Any, plot: Any, par: Any, rows: Any, size: Any) -> None:
+def begin(plot: Any, dense: bool, w: World) -> None:
     """Start a track from a plot: position the plot's, velocity unknown within the largest speed.
 
     The speeds fill a disc of radius `max_speed`, whose standard deviation is half of that in each
     axis; the second plot is taken in by the Kalman update, which makes it the two-point start.
     """
-    track = tracks[size[N_TRACKS]]
-    size[N_TRACKS] += 1
+    index = w.size[N_TRACKS]
+    track, par = w.tracks[index], w.par
+    w.size[N_TRACKS] += 1
+    w.wake[index] = -math.inf
     track.id, track.born, track.t = plot.ordinal, plot.t, plot.t
     x, P = track.x, track.P
     x[0], x[1], x[2], x[3] = plot.e, plot.n, 0.0, 0.0
@@ -48,36 +60,50 @@ def begin(tracks: Any, plot: Any, par: Any, rows: Any, size: Any) -> None:
             P[i, j] = 0.0
     P[0, 0], P[0, 1], P[1, 0], P[1, 1] = plot.ee, plot.en, plot.en, plot.nn
     P[2, 2] = P[3, 3] = 0.25 * par.max_speed * par.max_speed
+    track.curve[0] = track.curve[1] = track.growth[1] = 0.0
+    track.growth[0] = track.growth[2] = par.q / 3.0
     track.sd_range, track.sd_azimuth = plot.sd_range, plot.sd_azimuth
     track.psi = plot.phi
-    track.wake_angle, track.wake_time = -math.inf, -math.inf
     track.score, track.level = _FIRST_SCORE, STARTER
-    track.history, track.passes, track.misses = 1, 1, 0
+    track.peak = track.score
+    track.history, track.passes, track.hits, track.misses = 1, 1, 1, 0
     track.last, track.previous = plot.ordinal, -1
-    track.slot, track.mode_3a, track.place, track.first = -1, plot.mode_3a, -1, -1
-    track.swept = track.served = track.dead = track.claims = False
-    report(track, _TENTATIVE, True, True, plot, 1.0, False, plot.t, 0.0, rows, size)
+    track.slot, track.place, track.first = -1, -1, -1
+    track.mode_3a, track.agreed, track.address = plot.mode_3a, 1, plot.address
+    _begin_height(track, plot)
+    track.dense, track.voiced = dense, True
+    track.swept = track.served = track.dead = track.claims = track.proven = False
+    report(track, _TENTATIVE, True, True, plot, 1.0, False, plot.t, w)
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def kill(index: int, w: World) -> None:
+    """Have the track buried at the end of the bin."""
+    track = w.tracks[index]
+    if not track.dead:
+        track.dead = track.served = True
+        w.dead[w.size[N_DEAD]] = index
+        w.size[N_DEAD] += 1
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def serve(
-    track: Any, index: int, hit: bool, seen: bool, plot: Any, probability: float, rough: bool, beam: Any,
-    par: Any, belief: Belief, blank: Any, rows: Any, size: Any, count: Any,
-) -> None:  # fmt: skip
+    index: int, hit: bool, seen: bool, plot: Any, probability: float, rough: bool, beam: Any, w: World
+) -> None:
     """Account for one pass of the beam over a track.
 
     `seen`: there was a plot in the gate, and the state is at its time; otherwise the state is left
     as it was. A pass over a blanked sector without a plot is no miss: the radar did not look.
     """
+    track, par = w.tracks[index], w.par
     t_pass = track.t if seen else max(beam.t - max(track.rho, 0.0) / par.bin * beam.step, track.t)
-    T = t_pass - track.t
-    e, n = track.x[0] + T * track.x[2] - beam.e, track.x[1] + T * track.x[3] - beam.n
+    e, n, _, _, _ = _predicted(track, t_pass - track.t)
     crossed = beam.phi - track.rho
-    track.psi += _TURN + _wrap(math.atan2(e, n) - track.psi)
+    track.psi += _TURN + _wrap(math.atan2(e - beam.e, n - beam.n) - track.psi)
     track.served, track.claims = True, False
-    track.wake_angle = -math.inf
-    if not seen and blank[math.floor(crossed / par.bin) % blank.size]:
-        count[C_BLANKED] += 1
+    w.wake[index] = -math.inf
+    if not seen and w.blank[math.floor(crossed / par.bin) % w.blank.size]:
+        w.tally[C_BLANKED] += 1
         return
     track.passes += 1
     track.history = ((track.history << 1) | (1 if hit else 0)) & ((1 << par.confirm_passes) - 1)
@@ -85,65 +111,129 @@ def serve(
     if seen:
         track.sd_range = max(plot.sd_range, 0.9 * track.sd_range)
         track.sd_azimuth = max(plot.sd_azimuth, 0.9 * track.sd_azimuth)
-        if plot.mode_3a >= 0 and hit:
-            track.mode_3a = plot.mode_3a
-        if hit:
-            track.previous, track.last = track.last, plot.ordinal
-    status = _promote(track, hit, beam, par, belief, index, size, count)
-    report(track, status, hit, seen, plot, probability, rough, t_pass, par.q, rows, size)
+    if hit:
+        track.hits += 1
+        track.previous, track.last = track.last, plot.ordinal
+        _learn(track, plot)
+    status = _keep(index, hit, w) if track.level == CONFIRMED else _judge(index, hit, w)
+    track.probability = probability
+    if track.voiced and not track.proven:
+        report(track, status, hit, seen, plot, probability, rough, t_pass, w)
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _promote(
-    track: Any, hit: bool, beam: Any, par: Any, belief: Belief, index: int, size: Any, count: Any,
-) -> int:  # fmt: skip
-    """Confirm, coast or delete; the status after this pass."""
-    if track.level == CONFIRMED:
-        # A young track that its misses make less likely than a fresh plot goes before its time.
-        if track.misses >= par.delete_misses or track.score < _FIRST_SCORE:
-            track.dead = True
-            count[C_LOST] += 1
-            return _DELETED
-        return _CONFIRMED if hit else _COASTING
-    hits, left = 0, track.history
-    while left:
-        hits += left & 1
-        left >>= 1
-    if (
-        track.level == TENTATIVE
-        and hit
-        and not _too_fast(track, par)
-        and hits >= par.confirm_hits
-        and track.score >= par.confirm_score
-    ):
-        track.level, track.slot = CONFIRMED, size[N_SLOTS]
-        belief.owner[track.slot] = index
-        size[N_SLOTS] += 1
-        _start_belief(track, beam.e, beam.n, par, belief)
-        count[C_CONFIRMED] += 1
-        return _CONFIRMED
-    if hits + max(par.confirm_passes - track.passes, 0) < par.confirm_hits or _too_fast(track, par):
-        track.dead = True
-        count[C_DELETED] += 1
+def _keep(index: int, hit: bool, w: World) -> int:
+    """Coast or delete a confirmed track; its status after this pass.
+
+    Its score is held below what `delete_misses` misses in a row take away, so that they delete it,
+    and so does evidence that says less and less for the target: in dense clutter there is always
+    some plot in the gate.
+    """
+    track, par = w.tracks[index], w.par
+    enough = _FIRST_SCORE - (par.delete_misses + 0.5) * math.log(max(1.0 - par.p_d * par.p_g, 1e-3))
+    track.score = min(track.score, max(enough, par.confirm_score))
+    if track.misses >= par.delete_misses or track.score < _FIRST_SCORE:
+        kill(index, w)
+        w.tally[C_LOST] += 1
+        return _DELETED
+    return _CONFIRMED if hit else _COASTING
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _judge(index: int, hit: bool, w: World) -> int:
+    """Find a young track proven, or delete it; its status after this pass."""
+    track, par = w.tracks[index], w.par
+    track.peak = max(track.peak, track.score)
+    fast = _too_fast(track, par)
+    track.proven = track.level == TENTATIVE and hit and not fast and _proven(track, par)
+    if not track.proven and (fast or _hopeless(track, par)):
+        kill(index, w)
+        w.tally[C_DELETED] += track.voiced
         return _DELETED
     return _TENTATIVE
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
+def confirm(index: int, plot: Any, beam: Any, w: World) -> None:
+    """Promote a proven track, whose last plot is `plot`."""
+    track, size = w.tracks[index], w.size
+    if not track.voiced:
+        # The number of its first plot is another branch's; no track starts from this plot.
+        track.id, track.voiced = plot.ordinal, True
+    track.proven = False
+    track.level, track.slot = CONFIRMED, size[N_SLOTS]
+    w.belief.owner[track.slot] = index
+    size[N_SLOTS] += 1
+    report(track, _CONFIRMED, True, True, plot, track.probability, False, track.t, w)
+    _start_belief(track, beam.e, beam.n, w.par, w.belief)
+    w.tally[C_CONFIRMED] += 1
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def by_score(track: Any, par: Any) -> bool:
+    """Evidence alone decides on the track: by name, or in dense clutter."""
+    named = par.initiation == SCORE or par.initiation == BRANCHING
+    return bool(named or (par.initiation == AUTO and track.dense))
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _recent_hits(track: Any) -> int:
+    hits, left = 0, track.history
+    while left:
+        hits += left & 1
+        left >>= 1
+    return hits
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _proven(track: Any, par: Any) -> bool:
+    """The track is a target's."""
+    counted = _recent_hits(track) >= par.confirm_hits
+    if par.initiation == M_OF_N:
+        return bool(counted)
+    scored = track.score >= par.confirm_score
+    if par.initiation == SCORE:
+        return bool(scored and track.hits >= _LEAST_HITS)
+    if by_score(track, par):
+        return bool(track.score >= par.confirm_score + _DENSER and track.hits >= _LEAST_HITS)
+    return bool(counted and scored)
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _hopeless(track: Any, par: Any) -> bool:
+    """The young track will not be confirmed."""
+    if by_score(track, par):
+        return bool(track.score < track.peak - _DROP)
+    return bool(_recent_hits(track) + max(par.confirm_passes - track.passes, 0) < par.confirm_hits)
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
 def report(
-    track: Any, status: int, hit: bool, seen: bool, plot: Any, probability: float, rough: bool, t: float,
-    q: float, rows: Any, size: Any,
-) -> None:  # fmt: skip
+    track: Any,
+    status: int,
+    hit: bool,
+    seen: bool,
+    plot: Any,
+    probability: float,
+    rough: bool,
+    t: float,
+    w: World,
+) -> None:
     """Write a row of the TRACK table; a track whose pass saw nothing is predicted to the pass."""
-    row = rows[size[N_ROWS]]
-    size[N_ROWS] += 1
-    x, P = track.x.copy(), track.P.copy()
-    predict_in_place(x, P, max(t - track.t, 0.0), q)
+    row = w.rows[w.size[N_ROWS]]
+    w.size[N_ROWS] += 1
+    x, P, T = track.x, track.P, max(t - track.t, 0.0)
+    e, n, ee, _, nn = _predicted(track, T)
     row.track, row.time, row.status, row.hit = track.id, t, status, hit
-    row.east, row.north, row.v_east, row.v_north = x[0], x[1], x[2], x[3]
-    row.sd_east, row.sd_north = math.sqrt(max(P[0, 0], 0.0)), math.sqrt(max(P[1, 1], 0.0))
-    row.sd_v_east, row.sd_v_north = math.sqrt(max(P[2, 2], 0.0)), math.sqrt(max(P[3, 3], 0.0))
-    row.up = row.v_up = row.sd_up = row.sd_v_up = np.nan
+    row.east, row.north = e, n
+    row.v_east, row.v_north = x[2] + T * track.curve[0], x[3] + T * track.curve[1]
+    row.sd_east, row.sd_north = math.sqrt(max(ee, 0.0)), math.sqrt(max(nn, 0.0))
+    row.sd_v_east = math.sqrt(max(P[2, 2] + 3.0 * T * track.growth[0], 0.0))
+    row.sd_v_north = math.sqrt(max(P[3, 3] + 3.0 * T * track.growth[2], 0.0))
+    up, v_up, pp, _, vv = _height(track, t, w.par.up_q)
+    row.up, row.v_up = up, v_up
+    known = math.isfinite(up)
+    row.sd_up, row.sd_v_up = math.sqrt(pp) if known else np.nan, math.sqrt(vv) if known else np.nan
     row.plot, row.plot_time, row.probability = -1, np.nan, np.nan
     if seen:
         row.plot, row.plot_time, row.probability = plot.ordinal, plot.t, probability
@@ -151,24 +241,40 @@ def report(
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def remove(index: int, tracks: Any, edges: Any, belief: Belief, size: Any) -> None:
-    """Take a track out; the last one moves into the hole, and so does what it believes."""
-    slot = tracks[index].slot
-    if slot >= 0:
-        last = size[N_SLOTS] - 1
-        if slot != last:
-            _move(belief, last, slot)
-            tracks[belief.owner[slot]].slot = slot
-        size[N_SLOTS] = last
-    last = size[N_TRACKS] - 1
-    if index != last:
-        tracks[index] = tracks[last]
+def bury(w: World) -> None:
+    """Take the dead out; the last tracks move into the holes, and so does what they believe."""
+    size, tracks, belief = w.size, w.tracks, w.belief
+    dead = w.dead[: size[N_DEAD]]
+    if dead.size == 0:
+        return
+    for index in dead:
+        slot = tracks[index].slot
+        if slot >= 0:
+            last = size[N_SLOTS] - 1
+            if slot != last:
+                _move(belief, last, slot)
+                tracks[belief.owner[slot]].slot = slot
+            tracks[index].slot = -1
+            size[N_SLOTS] = last
+    left = size[N_TRACKS] - dead.size
+    moved = np.full(dead.size, -1, np.int64)  # where the tracks behind `left` go
+    mover = size[N_TRACKS] - 1
+    for index in np.sort(dead):
+        if index >= left:
+            break
+        while tracks[mover].dead:
+            mover -= 1
+        tracks[index] = tracks[mover]
+        w.wake[index] = w.wake[mover]
         if tracks[index].slot >= 0:
             belief.owner[tracks[index].slot] = index
-        for k in range(size[N_EDGES]):
-            if edges[k].track == last:
-                edges[k].track = index
-    size[N_TRACKS] = last
+        moved[mover - left] = index
+        mover -= 1
+    for k in range(size[N_EDGES]):
+        edge = w.edges[k]
+        if edge.track >= left:
+            edge.track = moved[edge.track - left]
+    size[N_TRACKS], size[N_DEAD] = left, 0
 
 
 @njit(cache=True, nogil=True, error_model="numpy")

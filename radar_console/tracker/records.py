@@ -1,6 +1,6 @@
 """The tables that the compiled sweep works on."""
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,8 +17,9 @@ STATE = np.dtype(
         ("P", "f8", (4, 4)),
         ("curve", "f8", (2,)),  # m/s², acceleration of the forecast; see `gating.predicted`
         ("growth", "f8", (3,)),  # m²/s³, ee, en, nn: the forecast's covariance grows by this times T³
-        ("up", "f8", (2,)),  # m and m/s, height and its rate at t; NaN unknown
+        ("up", "f8", (2,)),  # m and m/s, height and its rate at `up_t`; NaN unknown
         ("up_P", "f8", (3,)),  # their covariance pp, pv, vv
+        ("up_t", "f8"),  # s, of the height
         ("anchor", "f8", (4,)),  # what the particles are offsets from, at t
         ("cos", "f8"),  # the particles' first axis is the bearing at confirmation
         ("sin", "f8"),
@@ -27,12 +28,13 @@ STATE = np.dtype(
         ("psi", "f8"),  # unwrapped bearing of the last pass
         ("rho", "f8"),  # beam phase relative to the next pass
         ("half_width", "f8"),  # of the gate, seen from the radar
-        ("wake_angle", "f8"),  # until the beam is there, and
-        ("wake_time", "f8"),  # before this time, the gate can't be reached
+        ("along", "f8"),  # m, half the extent of the gate in range
         ("score", "f8"),  # log-likelihood ratio: a target against clutter
+        ("peak", "f8"),  # the highest score so far
         ("level", "i8"),
         ("history", "i8"),  # hits of the last passes, as bits
         ("passes", "i8"),
+        ("hits", "i8"),
         ("misses", "i8"),  # in a row
         ("last", "i8"),  # ordinal of the plot of its last hit
         ("previous", "i8"),  # of the hit before; -1 none
@@ -40,8 +42,12 @@ STATE = np.dtype(
         ("mode_3a", "i8"),
         ("address", "i8"),
         ("agreed", "i8"),  # hits in a row whose identity was the track's own
-        ("place", "i8"),  # in the list of open tracks; -1 not open
+        ("place", "i8"),  # in the list of open tracks
         ("first", "i8"),  # of its edges in this bin; -1 none
+        ("dense", "?"),  # it was born in dense clutter
+        ("voiced", "?"),  # of the branches of one first plot one is reported
+        ("proven", "?"),  # to be confirmed when all who claim its last plot are served
+        ("probability", "f8"),  # of that plot
         ("claims", "?"),  # it has plots in its gate
         ("swept", "?"),
         ("served", "?"),  # in this bin
@@ -75,12 +81,43 @@ PENDING = np.dtype(
         ("weight", "f8"),  # 1 less what confirmed tracks have used of it
         ("awaited", "?"),  # an open confirmed track claims it
         ("mark", "i8"),  # scratch: first claimant, or column of a cluster
+        ("head", "i8"),  # scratch: first of its edges
     ]
 )
 """A centroid that waits for its bin, or for the tracks that claim it."""
 
-EDGE = np.dtype([("track", "i8"), ("plot", "i8"), ("density", "f8"), ("next", "i8")])
-"""A plot in a track's gate; `density` is the Gaussian likelihood, m⁻²."""
+EDGE = np.dtype(
+    [
+        ("track", "i8"),
+        ("plot", "i8"),
+        ("density", "f8"),  # Gaussian likelihood, m⁻²
+        ("spent", "?"),  # its track was served
+        ("next", "i8"),  # scratch: of the same track, or of the same plot
+    ]
+)
+"""A plot in a track's gate; it stays until all who claim the plot are served."""
+
+MEMBER = np.dtype(
+    [
+        ("track", "i8"),
+        ("cluster", "i8"),
+        ("pairs", "i8"),  # the first of its pairs
+        ("kept", "i8"),  # how many of them the association kept; they stand first
+        ("used", "f8"),  # Σ β
+        ("rough", "?"),  # associated approximately
+    ]
+)
+"""A confirmed track whose cluster is associated in this bin."""
+
+PAIR = np.dtype(
+    [
+        ("plot", "i8"),
+        ("w", "f8"),  # likelihood, m⁻²
+        ("total", "f8"),  # what `filters.log_likelihood` gave with it
+        ("beta", "f8"),
+    ]
+)
+"""A member and a plot in its gate."""
 
 BEAM = np.dtype([("phi", "f8"), ("t", "f8"), ("e", "f8"), ("n", "f8"), ("step", "f8"), ("seen", "?")])
 """A bin's end: beam angle, time, position of the sensor; how long it took, and whether the radar looked."""
@@ -105,6 +142,12 @@ PARAMETERS = np.dtype(
         ("max_range", "f8"),
         ("sd_range", "f8"),
         ("sd_azimuth", "f8"),
+        ("up_q", "f8"),  # m²/s³, of the height's rate
+        ("associator", "i8"),
+        ("rectangle", "?"),  # the gate is one, else an ellipse
+        ("initiation", "i8"),  # AUTO, ...
+        ("identity", "?"),  # codes and addresses are evidence
+        ("max_tracks", "i8"),
         ("turn", "f8"),  # s, nominal time of a turn of the antenna
         ("filter", "i8"),  # KALMAN, EXTENDED, ...
         ("proposal", "i8"),  # PRIOR, OPTIMAL, ADAPTED
@@ -124,6 +167,7 @@ KALMAN, EXTENDED, UNSCENTED, IMM, PARTICLE = range(5)
 PRIOR, OPTIMAL, ADAPTED = range(3)
 SYSTEMATIC, STRATIFIED, RESIDUAL, MULTINOMIAL = range(4)
 CV, CA, CT, SINGER = range(4)
+AUTO, M_OF_N, SCORE, BRANCHING = range(4)
 
 
 class Belief(NamedTuple):
@@ -143,9 +187,53 @@ class Belief(NamedTuple):
 
 
 # The sweep's own counts, in an int64 array; `stage.Counts` gives them their names.
-C_STARTED, C_CONFIRMED, C_DELETED, C_LOST, C_FORCED, C_APPROXIMATE, C_EXTENDED, C_BLANKED, C_MERGED = range(9)
-COUNTS = 9
+SWEPT_COUNTS = (
+    "started",
+    "confirmed",
+    "deleted",
+    "lost",
+    "forced",
+    "approximate",
+    "extended",
+    "blanked",
+    "merged",
+    "capped",
+)
+(
+    C_STARTED,
+    C_CONFIRMED,
+    C_DELETED,
+    C_LOST,
+    C_FORCED,
+    C_APPROXIMATE,
+    C_EXTENDED,
+    C_BLANKED,
+    C_MERGED,
+    C_CAPPED,
+) = range(len(SWEPT_COUNTS))
 
 # How much of each table is in use, in an int64 array.
-N_TRACKS, N_POOL, N_EDGES, N_SLOTS, N_ROWS, N_QUEUE = range(6)
-SIZES = 6
+N_TRACKS, N_POOL, N_EDGES, N_SLOTS, N_ROWS, N_QUEUE, N_OPEN, N_MEMBERS, N_PAIRS, N_DEAD, N_PHASE = range(11)
+SIZES = 11
+
+
+class World(NamedTuple):
+    """Everything that the compiled sweep works on."""
+
+    par: Any  # PARAMETERS record
+    clutter: Any  # `clutter.MAP` record
+    tracks: Any  # STATE table
+    wake: NDArray[np.float64]  # (tracks, 2) beam angle and time before which a gate can't be reached
+    opened: NDArray[np.int64]  # (tracks,) the rows whose gates the beam has reached
+    dead: NDArray[np.int64]  # (tracks,) the rows to be buried at the bin's end
+    pool: Any  # PENDING table
+    edges: Any  # EDGE table
+    members: Any  # MEMBER table
+    pairs: Any  # PAIR table
+    relative: NDArray[np.float32]  # (pairs, N) what `filters.log_likelihood` gave
+    belief: Belief
+    blank: NDArray[np.bool_]  # (bins,) the radar did not look
+    rows: Any  # TRACK table
+    size: NDArray[np.int64]  # (SIZES,)
+    need: NDArray[np.int64]  # (SIZES,) of the bin that did not fit
+    tally: NDArray[np.int64]  # (counts,)

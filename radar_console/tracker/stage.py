@@ -5,8 +5,11 @@ tracks, not in one bit: a bin is processed once the watermark `Sector.complete` 
 """
 
 import math
-from collections.abc import Iterable, Iterator
+import os
+from collections.abc import Callable, Iterable, Iterator
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -20,23 +23,29 @@ from radar_console.estimation.measurement import from_polar
 from radar_console.estimation.particle import normals
 from radar_console.scenario import TrackerSettings
 from radar_console.tracker import clutter, gating
+from radar_console.tracker.clusters import associate, step, weigh
 from radar_console.tracker.records import (
     BEAM,
-    COUNTS,
     EDGE,
+    MEMBER,
     N_EDGES,
+    N_MEMBERS,
+    N_PAIRS,
     N_POOL,
     N_QUEUE,
     N_ROWS,
     N_SLOTS,
     N_TRACKS,
+    PAIR,
     PARAMETERS,
     PENDING,
     SIZES,
     STATE,
+    SWEPT_COUNTS,
     Belief,
+    World,
 )
-from radar_console.tracker.sweep import sweep
+from radar_console.tracker.sweep import close_bin, open_bin, sweep
 
 # In the order of their numbers in `records`.
 _FILTERS = ("kalman", "extended", "unscented", "imm", "particle")
@@ -44,6 +53,12 @@ _PROPOSALS = ("prior", "optimal", "adapted")
 _RESAMPLINGS = ("systematic", "stratified", "residual", "multinomial")
 _MODELS = ("cv", "ca", "ct", "singer")
 
+_INITIATIONS = ("auto", "m-of-n", "score", "branching")
+
+_MOST_THREADS = 4
+_MANY_TRACKS = 100  # from which on threads are worth their trouble
+_LEAST_SHARE = 4  # members for each thread
+_CLIMB_NOISE = 1.0  # m²/s³, of the rate of climb
 _GRID = 2.0**20  # per s and per m: interpolated values are rounded, so that no cut shows in them
 _SD_HEIGHT = 30.0  # m, of a reported height
 _LOG = 2048  # sectors that are remembered, to find where the beam was
@@ -66,21 +81,9 @@ class Counts:
     approximate: int = 0  # updates whose association was past the exact algorithm's budget
     blanked: int = 0  # passes over sectors where the radar did not look
     merged: int = 0  # tracks that another one had the same plots as
+    capped: int = 0  # young tracks that went because there were too many
     clock_back: int = 0  # sectors whose time went back
     beam_back: int = 0  # sectors whose angle went back
-
-
-_SWEPT_COUNTS = (
-    "started",
-    "confirmed",
-    "deleted",
-    "lost",
-    "forced",
-    "approximate",
-    "extended",
-    "blanked",
-    "merged",
-)
 
 
 class Tracker:
@@ -90,23 +93,22 @@ class Tracker:
     ----------
     settings, radar : the scenario's [tracker], and the sensor
     seed : of all random numbers
+    threads : at work when there are many tracks; without it as many as there are processors. Their
+        number has no influence on the tracks.
     """
 
-    def __init__(self, settings: TrackerSettings, radar: Radar, seed: int) -> None:
+    def __init__(
+        self, settings: TrackerSettings, radar: Radar, seed: int, threads: int | None = None
+    ) -> None:
         self.settings, self.radar, self.counts = settings, radar, Counts()
-        self._par = _parameters(settings, radar, seed)[0]
-        self._clutter = clutter.empty_map()
-        self._size, self._need = np.zeros(SIZES, np.int64), np.zeros(SIZES, np.int64)
-        self._swept = np.zeros(COUNTS, np.int64)
-        self._tracks = np.zeros(64, STATE)
-        self._pool, self._edges = np.zeros(64, PENDING), np.zeros(256, EDGE)
-        self._rows = np.zeros(256, TRACK)
-        self._belief = _empty_belief(settings)
-        self._blank = np.zeros(settings.bins, np.bool_)
+        self._world = _empty_world(settings, radar, seed)
         self._queue = np.zeros(0, PENDING)
         self._log = _BeamLog()
         self._next_bin: int | None = None
         self._last: Sector | None = None
+        self._adopted: list[Table] = []
+        self._threads = min(os.cpu_count() or 1, _MOST_THREADS) if threads is None else threads
+        self._pool: ThreadPoolExecutor | None = None
 
     def __call__(self, sectors: Iterable[Sector]) -> Iterator[Sector]:
         """Add the rows of all services to the sectors that completed them."""
@@ -124,8 +126,8 @@ class Tracker:
             self.counts.beam_back += 1
         self._log.append(sector)
         if self._next_bin is None:
-            self._next_bin = math.floor(self._log.angle[0] / self._par["bin"]) + 1
-            self._clutter[0]["last"] = math.floor(self._log.angle[0] / TURN * clutter.COLUMNS)
+            self._next_bin = math.floor(self._log.angle[0] / self._bin) + 1
+            self._world.clutter["last"] = math.floor(self._log.angle[0] / TURN * clutter.COLUMNS)
         self._skip_long_gap()
         if len(sector.centroids):
             self._take(sector)
@@ -151,12 +153,12 @@ class Tracker:
         good &= table["range"] >= 0
         self.counts.invalid += len(table) - int(good.sum())
         plots = self._pending(table[good])
-        late = plots["phi"] < (self._next_bin_number - 1) * self._par["bin"]
+        late = plots["phi"] < (self._next_bin_number - 1) * self._bin
         self.counts.late += int(late.sum())
-        waiting, fresh = self._queue[self._size[N_QUEUE] :], plots[~late]
+        waiting, fresh = self._queue[self._world.size[N_QUEUE] :], plots[~late]
         self._queue = np.empty(len(waiting) + len(fresh), PENDING)
         self._queue[: len(waiting)], self._queue[len(waiting) :] = waiting, fresh
-        self._size[N_QUEUE] = 0
+        self._world.size[N_QUEUE] = 0
         self._queue = self._queue[
             np.lexsort((self._queue["ordinal"], self._queue["range"], self._queue["phi"]))
         ]
@@ -166,7 +168,7 @@ class Tracker:
         plots = np.zeros(len(table), PENDING)
         angle, (east, north, up) = self._log.at_time(table["time"])
         # The watermark bounds what a time can say: nothing below it is delivered any more.
-        closed = (self._next_bin_number - 1) * self._par["bin"]
+        closed = (self._next_bin_number - 1) * self._bin
         late = angle < closed - 0.5 * TURN  # so late that the nearest turn would be one ahead
         angle = np.where(late, angle, np.clip(angle, closed, self._log.angle[-1]))
         azimuth = table["azimuth"]
@@ -175,12 +177,14 @@ class Tracker:
         plots["range"] = ground_range(table["range"], table["height"], above_sea)
         for name in ("sd_range", "sd_azimuth"):
             claimed = table[name]
-            plots[name] = np.where(np.isfinite(claimed) & (claimed > 0), claimed, self._par[name])
+            plots[name] = np.where(np.isfinite(claimed) & (claimed > 0), claimed, self._world.par[name])
         z = from_polar(plots["range"], azimuth, plots["sd_range"], plots["sd_azimuth"])
         plots["e"], plots["n"] = z.mean[:, 0] + east, z.mean[:, 1] + north
         plots["ee"], plots["en"], plots["nn"] = z.cov[:, 0, 0], z.cov[:, 0, 1], z.cov[:, 1, 1]
         plots["s_e"], plots["s_n"] = east, north
         plots["up"], plots["uu"] = table["height"], _SD_HEIGHT**2
+        if self.settings.dimensions == 2:
+            plots["up"] = np.nan
         plots["doppler"], plots["sd_doppler"] = table["doppler"], table["sd_doppler"]
         plots["t"], plots["ordinal"] = table["time"], table["ordinal"]
         plots["mode_3a"], plots["address"] = table["mode_3a"], table["address"]
@@ -189,26 +193,26 @@ class Tracker:
         return plots
 
     @property
+    def _bin(self) -> float:
+        return float(self._world.par["bin"])
+
+    @property
     def _next_bin_number(self) -> int:
         assert self._next_bin is not None
         return self._next_bin
 
     def _skip_long_gap(self) -> None:
         """Whole turns that nobody saw: the tracks' angles go with the beam, and nothing is counted."""
-        gap = (
-            self._log.angle[-2] - self._next_bin_number * self._par["bin"]
-            if len(self._log.angle) > 1
-            else 0.0
-        )
+        gap = self._log.angle[-2] - self._next_bin_number * self._bin if len(self._log.angle) > 1 else 0.0
         turns = math.floor(gap / TURN)
         if turns >= _FEW_TURNS:
-            self._tracks["psi"] += turns * TURN
-            self._tracks["wake_angle"] = -np.inf
+            self._world.tracks["psi"] += turns * TURN
+            self._world.wake[:] = -np.inf
             self._next_bin = self._next_bin_number + turns * self.settings.bins
 
     def _run(self, complete: float, final: bool) -> Table:
         """Serve the bins below the watermark; the rows of what was served."""
-        first, width = self._next_bin_number, float(self._par["bin"])
+        first, width = self._next_bin_number, self._bin
         stop = first
         while stop * width <= complete:
             stop += 1
@@ -220,27 +224,43 @@ class Tracker:
         rows: list[Table] = []
         done = 0
         while done < len(beams):
-            done += sweep(
-                beams[done:], self._par, self._clutter[0], self._queue, self._tracks, self._pool, self._edges,
-                self._belief, self._blank, self._rows, self._size, self._need, self._swept, final,
-            )  # fmt: skip
-            rows.append(self._rows[: self._size[N_ROWS]].copy())
-            self._size[N_ROWS] = 0
+            done += self._sweep(beams[done:], final)
+            rows.append(self._world.rows[: self._world.size[N_ROWS]].copy())
+            self._world.size[N_ROWS] = 0
             if done < len(beams):
-                self._grow()
+                self._world = _grown(self._world)
         self._next_bin = stop
-        for name, value in zip(_SWEPT_COUNTS, self._swept, strict=True):
-            setattr(self.counts, name, int(value))
+        for name, value in zip(SWEPT_COUNTS, self._world.tally.tolist(), strict=True):
+            setattr(self.counts, name, value)
         return rows[0] if len(rows) == 1 else np.concatenate(rows)
 
-    def _grow(self) -> None:
-        """Make room for the next bin, and for some more."""
-        need = self._need
-        self._tracks, self._pool = _longer(self._tracks, need[N_TRACKS]), _longer(self._pool, need[N_POOL])
-        self._rows, self._edges = _longer(self._rows, need[N_ROWS]), _longer(self._edges, need[N_EDGES])
-        belief = self._belief
-        slots = {name: _longer(getattr(belief, name), need[N_SLOTS]) for name in Belief._fields[:-1]}
-        self._belief = belief._replace(**slots)
+    def _sweep(self, beams: Any, final: bool) -> int:
+        """Process bins until one needs larger tables; the number of bins that are done."""
+        if self._threads == 1 or self._world.size[N_SLOTS] < _MANY_TRACKS:
+            return int(sweep(beams, self._queue, self._world, final))
+        if self._pool is None:
+            self._pool = ThreadPoolExecutor(self._threads - 1, "tracker")
+        world = self._world
+        for b in range(len(beams)):
+            if not open_bin(beams[b], self._queue, world, final):
+                return b
+            if world.size[N_MEMBERS]:
+                self._share(weigh)
+                associate(beams[b], world)
+                self._share(step)
+            close_bin(beams[b], world, final)
+        return len(beams)
+
+    def _share(self, work: Callable[[World, int, int], None]) -> None:
+        """Do the work of all members, a slice in each thread."""
+        assert self._pool is not None
+        members = int(self._world.size[N_MEMBERS])
+        parts = min(self._threads, max(members // _LEAST_SHARE, 1))
+        edges = [members * k // parts for k in range(parts + 1)]
+        others = [self._pool.submit(work, self._world, lo, hi) for lo, hi in pairwise(edges[1:])]
+        work(self._world, 0, edges[1])
+        for other in others:
+            other.result()
 
 
 class _BeamLog:
@@ -333,6 +353,12 @@ def _parameters(settings: TrackerSettings, radar: Radar, seed: int) -> NDArray[n
         "max_range": radar.max_range,
         "sd_range": radar.sd_range,
         "sd_azimuth": radar.sd_azimuth,
+        "up_q": _CLIMB_NOISE,
+        "associator": 0,
+        "rectangle": settings.gate == "rectangle",
+        "initiation": _INITIATIONS.index(settings.initiation),
+        "identity": settings.identity == "use",
+        "max_tracks": settings.max_tracks,
         "turn": radar.rotation,
         "filter": _FILTERS.index(settings.filter),
         "proposal": _PROPOSALS.index(settings.proposal),
@@ -354,10 +380,11 @@ def _parameters(settings: TrackerSettings, radar: Radar, seed: int) -> NDArray[n
     return par
 
 
-def _empty_belief(settings: TrackerSettings) -> Belief:
-    """Room for a few tracks of the filter in use."""
-    slots, count = 16, settings.particles if settings.filter == "particle" else 0
-    return Belief(
+def _empty_world(settings: TrackerSettings, radar: Radar, seed: int) -> World:
+    """Room for a few tracks, none of them there."""
+    count = settings.particles if settings.filter == "particle" else 0
+    slots = 16
+    belief = Belief(
         np.zeros(slots, np.int64),
         np.zeros((slots, 4, count), np.float32),
         np.zeros((slots, count), np.float32),
@@ -367,6 +394,47 @@ def _empty_belief(settings: TrackerSettings) -> Belief:
         np.zeros((slots, 0)),
         normals(),
     )
+    return World(
+        par=_parameters(settings, radar, seed)[0],
+        clutter=clutter.empty_map()[0],
+        tracks=np.zeros(64, STATE),
+        wake=np.zeros((64, 2)),
+        opened=np.zeros(64, np.int64),
+        dead=np.zeros(64, np.int64),
+        pool=np.zeros(64, PENDING),
+        edges=np.zeros(256, EDGE),
+        members=np.zeros(64, MEMBER),
+        pairs=np.zeros(64, PAIR),
+        relative=np.zeros((64, count), np.float32),
+        belief=belief,
+        blank=np.zeros(settings.bins, np.bool_),
+        rows=np.zeros(256, TRACK),
+        size=np.zeros(SIZES, np.int64),
+        need=np.zeros(SIZES, np.int64),
+        tally=np.zeros(len(SWEPT_COUNTS), np.int64),
+    )
+
+
+_ROOM = {
+    "tracks": N_TRACKS,
+    "wake": N_TRACKS,
+    "opened": N_TRACKS,
+    "dead": N_TRACKS,
+    "pool": N_POOL,
+    "edges": N_EDGES,
+    "members": N_MEMBERS,
+    "pairs": N_PAIRS,
+    "relative": N_PAIRS,
+    "rows": N_ROWS,
+}
+
+
+def _grown(world: World) -> World:
+    """The same world with room for the next bin, and for some more."""
+    need, belief = world.need, world.belief
+    slots = {name: _longer(getattr(belief, name), need[N_SLOTS]) for name in Belief._fields[:-1]}
+    tables = {name: _longer(getattr(world, name), need[place]) for name, place in _ROOM.items()}
+    return world._replace(belief=belief._replace(**slots), **tables)
 
 
 def _longer(table: Any, count: int) -> Any:

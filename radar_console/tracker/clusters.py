@@ -1,0 +1,268 @@
+"""Confirmed tracks: the clusters that share plots, their association, their updates.
+
+A cluster is associated when the beam is past all its members' gates, or one of them has waited too
+long. `weigh` and `step` touch only the members they are given, so that slices of them can run side
+by side; everything between is one thread's.
+"""
+
+import math
+from typing import Any
+
+import numpy as np
+from numba import njit
+
+from radar_console.tracker import clutter, filters, gating, height, identity, management
+from radar_console.tracker.association import jpda
+from radar_console.tracker.records import (
+    C_APPROXIMATE,
+    C_FORCED,
+    CONFIRMED,
+    N_EDGES,
+    N_MEMBERS,
+    N_OPEN,
+    N_PAIRS,
+    N_POOL,
+    World,
+)
+
+_find, _solve, _BUDGET = jpda.find, jpda.solve, jpda.BUDGET
+_advance, _log_likelihood, _update = filters.advance, filters.log_likelihood, filters.update
+_estimate, _predicted, _MARGIN = clutter.estimate, gating.predicted, gating.MARGIN
+_height_factor, _update_height, _identity_factor = height.factor, height.update, identity.factor
+_serve = management.serve
+
+_PRUNE = 1e-3  # of the miss: a pair that is less likely is no pair
+_LEAST_DENSITY = 1e-15  # m⁻²
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def group(beam: Any, w: World, final: bool) -> None:
+    """Find the clusters that are due, and list their members and pairs."""
+    size, tracks, pool, edges = w.size, w.tracks, w.pool, w.edges
+    n = size[N_OPEN]
+    size[N_MEMBERS] = size[N_PAIRS] = 0
+    for p in range(size[N_POOL]):
+        pool[p].mark = -1
+    parent = np.arange(n)
+    any_swept = False
+    for place in range(n):
+        track = tracks[w.opened[place]]
+        any_swept |= track.level == CONFIRMED and track.swept
+    if not any_swept:
+        return
+    for k in range(size[N_EDGES]):
+        edge = edges[k]
+        if edge.spent or tracks[edge.track].level != CONFIRMED:
+            continue
+        place, plot = tracks[edge.track].place, pool[edge.plot]
+        if plot.mark < 0:
+            plot.mark = place
+        else:
+            a, b = _find(parent, plot.mark), _find(parent, place)
+            parent[max(a, b)] = min(a, b)
+    head, next_member = np.full(n, -1, np.int64), np.full(n, -1, np.int64)
+    complete, due = np.ones(n, np.bool_), np.zeros(n, np.bool_)
+    for place in range(n - 1, -1, -1):
+        track = tracks[w.opened[place]]
+        if track.level != CONFIRMED:
+            continue
+        root = _find(parent, place)
+        next_member[place], head[root] = head[root], place
+        if not track.swept:
+            complete[root] = False
+        elif final or track.rho >= track.half_width + _MARGIN + w.par.wait:
+            due[root] = True
+    m, pairs = 0, 0
+    for root in range(n):
+        if head[root] < 0 or not (complete[root] or due[root]):
+            continue
+        if not complete[root]:
+            w.tally[C_FORCED] += 1
+        place = head[root]
+        while place >= 0:
+            index = w.opened[place]
+            member = w.members[m]
+            member.track, member.cluster, member.pairs = index, root, pairs
+            member.kept, member.used, member.rough = 0, 0.0, False
+            m += 1
+            k = tracks[index].first
+            while k >= 0:
+                if pool[edges[k].plot].weight > 0.0:
+                    pairs += 1
+                k = edges[k].next
+            place = next_member[place]
+    size[N_MEMBERS], size[N_PAIRS] = m, pairs
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def weigh(w: World, lo: int, hi: int) -> None:
+    """Predict the members from `lo` to `hi` to their plots, and weigh these."""
+    tracks, pool, edges, par = w.tracks, w.pool, w.edges, w.par
+    for m in range(lo, hi):
+        member = w.members[m]
+        track = tracks[member.track]
+        n = member.pairs
+        if track.swept and track.first >= 0:
+            _advance(track, max(_mean_time(track, pool, edges), track.t), par, w.belief)
+        k = track.first
+        while k >= 0:
+            plot = pool[edges[k].plot]
+            if plot.weight > 0.0:
+                pair = w.pairs[n]
+                pair.plot, pair.w, pair.total, pair.beta = edges[k].plot, edges[k].density, 1.0, 0.0
+                if track.swept:
+                    log_g, pair.total = _log_likelihood(track, plot, par, w.belief, w.relative[n])
+                    if not par.gaussian:
+                        pair.w = math.exp(log_g)
+                        if par.use_doppler and math.isfinite(plot.doppler):
+                            pair.w *= 2.0 * par.max_speed  # false ones have any range rate
+                n += 1
+            k = edges[k].next
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _mean_time(track: Any, pool: Any, edges: Any) -> float:
+    """Mean time of the plots in the gate, weighted by their likelihoods."""
+    total, t, k = 0.0, 0.0, track.first
+    origin = pool[edges[k].plot].t
+    while k >= 0:
+        total += edges[k].density
+        t += edges[k].density * (pool[edges[k].plot].t - origin)
+        k = edges[k].next
+    mean: float = origin + t / total
+    return mean
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def false_density(track: Any, beam: Any, w: World) -> float:
+    """λ, m⁻², where the track is."""
+    if not math.isnan(w.par.clutter):
+        return max(float(w.par.clutter), _LEAST_DENSITY)
+    e, n, _, _, _ = _predicted(track, max(beam.t - track.t, 0.0))
+    return max(_estimate(w.clutter, e - beam.e, n - beam.n, w.par.max_range), _LEAST_DENSITY)
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def evidence(track: Any, plot: Any, par: Any) -> float:
+    """What a plot says besides its position: likelihood ratio of its height and its identity."""
+    ratio = 1.0
+    if math.isfinite(plot.up):
+        ratio = _height_factor(track, plot, par.up_q)
+    if par.identity and (plot.mode_3a >= 0 or plot.address >= 0):
+        ratio *= _identity_factor(track, plot)
+    return ratio
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def associate(beam: Any, w: World) -> None:
+    """Find the probability of every pair, cluster by cluster, and use the plots up."""
+    lo, stop = 0, w.size[N_MEMBERS]
+    while lo < stop:
+        hi = lo + 1
+        while hi < stop and w.members[hi].cluster == w.members[lo].cluster:
+            hi += 1
+        _associate(lo, hi, beam, w)
+        lo = hi
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _associate(lo: int, hi: int, beam: Any, w: World) -> None:
+    tracks, pool, par = w.tracks, w.pool, w.par
+    begin = w.members[lo].pairs
+    end = w.members[hi].pairs if hi < w.size[N_MEMBERS] else w.size[N_PAIRS]
+    m, pairs = hi - lo, end - begin
+    miss = np.full(m, 1.0 - par.p_d * par.p_g)
+    row, col, weight = np.empty(pairs, np.int64), np.empty(pairs, np.int64), np.empty(pairs)
+    kept = np.empty(pairs, np.int64)
+    for k in range(begin, end):
+        pool[w.pairs[k].plot].mark = -1
+    n, plots = 0, 0
+    for i in range(m):
+        member = w.members[lo + i]
+        track = tracks[member.track]
+        scale = par.p_d / false_density(track, beam, w)
+        until = w.members[lo + i + 1].pairs if lo + i + 1 < w.size[N_MEMBERS] else w.size[N_PAIRS]
+        for k in range(member.pairs, until):
+            pair = w.pairs[k]
+            plot = pool[pair.plot]
+            pair.w *= scale * plot.weight * evidence(track, plot, par)
+            if pair.w > _PRUNE * miss[i]:
+                if plot.mark < 0:
+                    plot.mark = plots
+                    plots += 1
+                row[n], col[n], weight[n], kept[n] = i, plot.mark, pair.w, k
+                n += 1
+    beta, beta_miss, rough = np.zeros(n), np.ones(m), np.zeros(m, np.bool_)
+    _solve(miss, plots, row[:n], col[:n], weight[:n], _BUDGET, beta, beta_miss, rough)
+    _cap(col, plots, kept, w, beta)
+    total = miss
+    for k in range(n):
+        i = row[k]
+        member, pair = w.members[lo + i], w.pairs[kept[k]]
+        total[i] += weight[k]
+        place = member.pairs + member.kept
+        if place != kept[k]:  # those that stay stand together
+            w.relative[place] = w.relative[kept[k]]
+            w.pairs[place] = pair
+            pair = w.pairs[place]
+        pair.beta = beta[k]
+        member.kept += 1
+        member.used += beta[k]
+        if tracks[member.track].swept:
+            pool[pair.plot].weight = max(pool[pair.plot].weight - beta[k], 0.0)
+    for i in range(m):
+        track = tracks[w.members[lo + i].track]
+        if track.swept:
+            track.score += math.log(total[i])
+            w.members[lo + i].rough = rough[i]
+            if rough[i]:
+                w.tally[C_APPROXIMATE] += 1
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _cap(col: Any, plots: int, kept: Any, w: World, beta: Any) -> None:
+    """No plot is used for more than what is left of it."""
+    used = np.zeros(plots)
+    for k in range(beta.size):
+        used[col[k]] += beta[k]
+    for k in range(beta.size):
+        left = w.pool[w.pairs[kept[k]].plot].weight
+        if used[col[k]] > left:
+            beta[k] *= left / used[col[k]]
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def step(w: World, lo: int, hi: int) -> None:
+    """Update the swept members from `lo` to `hi`."""
+    for m in range(lo, hi):
+        member = w.members[m]
+        track, n, begin = w.tracks[member.track], member.kept, member.pairs
+        if not track.swept or track.first < 0:
+            continue
+        beta, total, chosen = np.empty(n), np.empty(n), np.empty(n, np.int64)
+        for k in range(n):
+            pair = w.pairs[begin + k]
+            beta[k], total[k], chosen[k] = pair.beta, pair.total, pair.plot
+        relative = w.relative[begin : begin + n]
+        _update(track, max(1.0 - member.used, 0.0), beta, total, relative, chosen, w.pool, w.par, w.belief)
+        _update_height(track, w.pool, chosen, beta, w.par.up_q)
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def serve_members(beam: Any, w: World) -> None:
+    """Account for the pass of every swept member."""
+    for m in range(w.size[N_MEMBERS]):
+        member = w.members[m]
+        if not w.tracks[member.track].swept:
+            continue
+        best = -1
+        for k in range(member.pairs, member.pairs + member.kept):
+            if best < 0 or w.pairs[k].beta > w.pairs[best].beta:
+                best = k
+        if best >= 0:
+            pair = w.pairs[best]
+            _serve(
+                member.track, member.used >= 0.5, True, w.pool[pair.plot], pair.beta, member.rough, beam, w
+            )
+        else:
+            _serve(member.track, False, False, w.pool[0], math.nan, member.rough, beam, w)
