@@ -71,7 +71,7 @@ def log_likelihood(track: Any, plot: Any, par: Any, belief: Belief, relative: Si
     """Log of the predictive density of a plot at its own time, m⁻², and 1; `relative` is left alone.
 
     The density is (1 - ε) N(ν; 0, S) + ε N(ν; 0, S + 63 R), mixed over the modes: an outlier errs eight
-    times as much as it claims. With Doppler it is relative to clutter's; see `innovation.measure`.
+    times as much as it claims. With Doppler it is per m/s, too; see `innovation.measure`.
     """
     x, P, mu = belief.x[track.slot], belief.P[track.slot], belief.mu[track.slot]
     r, n = x.shape

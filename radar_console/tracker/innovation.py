@@ -36,9 +36,8 @@ def measure(
 
     Returns
     -------
-    m, and what turns the log-density of ν into one per m² of position, relative to Dopplers that
-    are spread evenly over ± max_speed, as clutter's are taken to be: a plot with Doppler and one
-    without compete on equal terms.
+    m, and what turns the log-density of ν into one per m² of position; per m/s too where a Doppler is
+    known and used by `par`. Within those 5 sigmas any Doppler up to max_speed is equally likely.
     """
     y_e, y_n = x[0] + lag * x[2] - plot.s_e, x[1] + lag * x[3] - plot.s_n
     for i in range(x.size):  # with the position at the plot's time
@@ -46,13 +45,16 @@ def measure(
         C[i, 1] = P[i, 1] + lag * P[i, 3]
     spread = C[0, 0] + lag * C[2, 0] + C[1, 1] + lag * C[3, 1]
     far = y_e * y_e + y_n * y_n > _CLOSE * _CLOSE * spread and plot.range > _CLOSE * plot.sd_range
-    m = 3 if far and par.use_doppler and math.isfinite(plot.doppler) else 2
-    factor = 0.0
+    m, factor = 2, 0.0
+    if par.use_doppler and math.isfinite(plot.doppler):
+        if far:
+            m = 3
+        else:
+            factor = -math.log(2.0 * par.max_speed)
     if m == 3:
         sd = plot.sd_doppler if plot.sd_doppler > 0.0 else _SD_DOPPLER
         R[2, 2] = sd * sd
         R[0, 2] = R[1, 2] = R[2, 0] = R[2, 1] = 0.0
-        factor = math.log(2.0 * par.max_speed)
         if par.filter != UNSCENTED:
             R[2, 2] += _curvature(x, P, spread, y_e * y_e + y_n * y_n)
     if far and par.filter in (EXTENDED, UNSCENTED):

@@ -340,8 +340,8 @@ def test_doppler_is_taken_in_with_the_position(name):
     nu = np.array([p["e"], p["n"], -20.0]) - h(X0)
     S = H @ P0 @ H.T + R
     gain = P0 @ H.T @ np.linalg.inv(S)
-    expected = float(log_density(nu, S)) + math.log(2 * track.par["max_speed"])
-    assert track.log_likelihood(p) == pytest.approx(expected, abs=0.02)  # polar against Cartesian
+    # Polar against Cartesian.
+    assert track.log_likelihood(p) == pytest.approx(float(log_density(nu, S)), abs=0.02)
     track.update(plot)
     sd = np.sqrt(np.diag(P0 - gain @ S @ gain.T))
     assert np.all(np.abs(track.track["x"] - X0 - gain @ nu) < 0.02 * sd)
@@ -355,6 +355,13 @@ def test_doppler_that_is_ignored_or_unknown_changes_nothing():
         a, b = solo("kalman", doppler=doppler), solo("kalman", doppler="ignore")
         assert a.log_likelihood(table[0]) == b.log_likelihood(without[0])
         assert np.array_equal(a.update(table).track["P"], b.update(without).track["P"])
+
+
+def test_doppler_at_the_radar_is_evenly_spread():
+    """The line of sight has no direction there."""
+    track = Solo(filter="kalman").start([0.0, 0.0, 100.0, 0.0], P0)
+    known, unknown = (track.log_likelihood(polar(0.0, 90.0, 1.0, doppler=d)[0]) for d in (80.0, np.nan))
+    assert known == pytest.approx(unknown - math.log(2.0 * track.par["max_speed"]))
 
 
 def test_doppler_without_its_deviation_is_2_m_per_s():
