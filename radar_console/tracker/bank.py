@@ -29,6 +29,7 @@ _MOST_SWITCHING = 0.5  # mean number of switches in one step of the prediction
 _MOST_STEPS = 1000
 _LEAST_MODE = 1e-9
 _LEAST_GROWTH = 1e-3  # of the growth by q
+_LEAST_SHARE = 0.25  # of a mode in the forecast's covariance
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -301,7 +302,8 @@ def _forecast(track: Any, x: Array, P: Array, mu: Array, par: Any) -> None:
     """Set the track's `curve` and `growth`, so that its forecast is the modes' own after one turn.
 
     After T s the forecast is at x + T v + T²/2 curve, its covariance that of constant velocity without
-    noise, and T³ growth.
+    noise, and T³ growth. No mode counts less than `_LEAST_SHARE` in the covariance: the gate that is
+    made from it must let in the first plot of a manoeuvre, when its mode is still improbable.
     """
     T, least = par.turn, _LEAST_GROWTH * par.q / 3.0
     if (mu.size == 1 and par.model[0] == CV) or not T > 0.0:
@@ -315,6 +317,8 @@ def _forecast(track: Any, x: Array, P: Array, mu: Array, par: Any) -> None:
     T3, before = T * T * T, track.P
     for i in range(2):
         track.curve[i] = 2.0 * (mean[i] - track.x[i] - T * track.x[i + 2]) / (T * T)
+    _raise(mu)
+    _moments(x, P, mu, mean, cov)
     ee = (cov[0, 0] - before[0, 0] - 2.0 * T * before[0, 2] - T * T * before[2, 2]) / T3
     nn = (cov[1, 1] - before[1, 1] - 2.0 * T * before[1, 3] - T * T * before[3, 3]) / T3
     en = (cov[0, 1] - before[0, 1] - T * (before[0, 3] + before[1, 2]) - T * T * before[2, 3]) / T3
@@ -324,6 +328,17 @@ def _forecast(track: Any, x: Array, P: Array, mu: Array, par: Any) -> None:
     c, s = (0.5 * (ee - nn) / half, en / half) if half > 0.0 else (1.0, 0.0)
     middle, half = 0.5 * (high + low), 0.5 * (high - low)
     track.growth[0], track.growth[1], track.growth[2] = middle + half * c, half * s, middle - half * c
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _raise(mu: Array) -> None:
+    """Give every mode its least share, and scale the sum back to 1."""
+    total = 0.0
+    for k in range(mu.size):
+        mu[k] = max(mu[k], _LEAST_SHARE)
+        total += mu[k]
+    for k in range(mu.size):
+        mu[k] /= total
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
