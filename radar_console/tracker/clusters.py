@@ -27,7 +27,7 @@ from radar_console.tracker.records import (
 
 _find, _solve, _BUDGET = jpda.find, choose.associate, jpda.BUDGET
 _advance, _log_likelihood, _update = filters.advance, filters.log_likelihood, filters.update
-_false_density, _MARGIN = clutter.false_density, gating.MARGIN
+_density_at, _MARGIN = clutter.density_at, gating.MARGIN
 _height_factor, _update_height, _identity_factor = height.factor, height.update, identity.factor
 _serve = management.serve
 
@@ -174,7 +174,12 @@ def _associate(lo: int, hi: int, w: World) -> None:
         for k in range(member.pairs, until):
             pair = w.pairs[k]
             plot = pool[pair.plot]
-            pair.w *= par.p_d / _false_density(track, plot, par) * plot.weight * evidence(track, plot, par)
+            pair.w *= (
+                par.p_d
+                / _density_at(plot, track.near, track.exposure, par)
+                * plot.weight
+                * evidence(track, plot, par)
+            )
             if pair.w > _PRUNE * miss[i]:
                 if plot.mark < 0:
                     plot.mark = plots

@@ -10,8 +10,8 @@ from numba import njit
 
 from radar_console.estimation.gaussian import Array
 from radar_console.estimation.particle import Singles
-from radar_console.tracker import cloud
-from radar_console.tracker.records import Belief
+from radar_console.tracker import bank, cloud
+from radar_console.tracker.records import PARTICLE, Belief
 
 _start_cloud, _advance_cloud, _weigh_cloud, _update_cloud = (
     cloud.start,
@@ -19,24 +19,38 @@ _start_cloud, _advance_cloud, _weigh_cloud, _update_cloud = (
     cloud.log_likelihood,
     cloud.update,
 )
+_start_bank, _advance_bank, _weigh_bank, _update_bank = (
+    bank.start,
+    bank.advance,
+    bank.log_likelihood,
+    bank.update,
+)
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def start(track: Any, sensor_e: float, sensor_n: float, par: Any, belief: Belief) -> None:
     """Begin from the track's Gaussian; `track.slot` is its row of `belief`."""
-    _start_cloud(track, sensor_e, sensor_n, par, belief)
+    if par.filter == PARTICLE:
+        _start_cloud(track, sensor_e, sensor_n, par, belief)
+    else:
+        _start_bank(track, sensor_e, sensor_n, par, belief)
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def advance(track: Any, t: float, par: Any, belief: Belief) -> None:
     """Predict to the time `t`; sets the track's time and moments."""
-    _advance_cloud(track, t, par, belief)
+    if par.filter == PARTICLE:
+        _advance_cloud(track, t, par, belief)
+    else:
+        _advance_bank(track, t, par, belief)
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def log_likelihood(track: Any, plot: Any, par: Any, belief: Belief, relative: Singles) -> tuple[float, float]:
     """log ĝ of a plot, and Σ w `relative`; `relative` (N,) is for `update`."""
-    return _weigh_cloud(track, plot, par, belief, relative)
+    if par.filter == PARTICLE:
+        return _weigh_cloud(track, plot, par, belief, relative)
+    return _weigh_bank(track, plot, par, belief, relative)
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -55,7 +69,10 @@ def update(
 
     `total` (plots,) and `relative` (plots, N) are what `log_likelihood` gave.
     """
-    _update_cloud(track, miss, beta, total, relative, chosen, pool, par, belief)
+    if par.filter == PARTICLE:
+        _update_cloud(track, miss, beta, total, relative, chosen, pool, par, belief)
+    else:
+        _update_bank(track, miss, beta, total, relative, chosen, pool, par, belief)
 
 
 __all__ = ["advance", "log_likelihood", "start", "update"]

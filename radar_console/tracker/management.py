@@ -109,7 +109,7 @@ def serve(
         return
     track.passes += 1
     if seen:
-        _gather(track, plot, par)
+        _gather(track, plot)
     track.history = ((track.history << 1) | (1 if hit else 0)) & ((1 << par.confirm_passes) - 1)
     track.misses = 0 if hit else track.misses + 1
     if seen:

@@ -84,18 +84,15 @@ PENDING = np.dtype(
         ("awaited", "?"),  # an open confirmed track claims it
         ("mark", "i8"),  # scratch: first claimant, or column of a cluster
         ("head", "i8"),  # scratch: first of its edges
-        ("near", "f8"),  # centroids around it that came before it in this turn,
+        ("near", "f8"),  # centroids around it that the beam met just before,
         ("exposure", "f8"),  # and m² where they were counted
-        ("near_before", "f8"),  # those of the turn before, less what confirmed tracks used
-        ("exposure_before", "f8"),
-        ("base", "f8"),  # m⁻², density of false centroids by the map
-        ("past", "i8"),  # its row among the past centroids
+        ("base", "f8"),  # m⁻², density of false centroids at such places
     ]
 )
 """A centroid that waits for its bin, or for the tracks that claim it."""
 
-PAST = np.dtype([("phi", "f8"), ("e", "f8"), ("n", "f8"), ("weight", "f8")])
-"""A centroid of the last turns."""
+PAST = np.dtype([("phi", "f8"), ("e", "f8"), ("n", "f8")])
+"""A centroid of the last half turn."""
 
 EDGE = np.dtype(
     [

@@ -22,7 +22,7 @@ from radar_console.estimation.gaussian import Array
 from radar_console.estimation.measurement import from_polar
 from radar_console.estimation.particle import normals
 from radar_console.scenario import TrackerSettings
-from radar_console.tracker import clutter, gating
+from radar_console.tracker import clutter, gating, modes
 from radar_console.tracker.association.choose import KINDS
 from radar_console.tracker.clusters import associate, step, weigh
 from radar_console.tracker.management import adopt
@@ -130,7 +130,6 @@ class Tracker:
         self._log.append(sector)
         if self._next_bin is None:
             self._next_bin = math.floor(self._log.angle[0] / self._bin) + 1
-            self._world.clutter["first"] = self._log.angle[0]
             self._world.clutter["last"] = math.floor(self._log.angle[0] / TURN * clutter.COLUMNS)
         self._skip_long_gap()
         if len(sector.centroids):
@@ -423,19 +422,21 @@ def _parameters(settings: TrackerSettings, radar: Radar, seed: int) -> NDArray[n
 def _empty_world(settings: TrackerSettings, radar: Radar, seed: int) -> World:
     """Room for a few tracks, none of them there."""
     count = settings.particles if settings.filter == "particle" else 0
-    slots = 16
+    slots, par = 16, _parameters(settings, radar, seed)[0]
+    models = par["model"][: par["models"]]
+    many, n = modes.count(int(par["filter"]), models), modes.state_size(models)
     belief = Belief(
         np.zeros(slots, np.int64),
         np.zeros((slots, 4, count), np.float32),
         np.zeros((slots, count), np.float32),
         np.zeros((slots, count), np.uint8),
-        np.zeros((slots, 0, 0)),
-        np.zeros((slots, 0, 0, 0)),
-        np.zeros((slots, 0)),
+        np.zeros((slots, many, n)),
+        np.zeros((slots, many, n, n)),
+        np.zeros((slots, many)),
         normals(),
     )
     return World(
-        par=_parameters(settings, radar, seed)[0],
+        par=par,
         clutter=clutter.empty_map()[0],
         tracks=np.zeros(64, STATE),
         wake=np.zeros((64, 2)),
