@@ -19,7 +19,7 @@ from radar_console.estimation.gaussian import Array
 from radar_console.estimation.measurement import from_polar
 from radar_console.estimation.particle import normals
 from radar_console.scenario import TrackerSettings
-from radar_console.tracker import clutter, gating
+from radar_console.tracker import cloud, clutter, gating
 from radar_console.tracker.records import (
     BEAM,
     COUNTS,
@@ -357,13 +357,14 @@ def _parameters(settings: TrackerSettings, radar: Radar, seed: int) -> NDArray[n
 def _empty_belief(settings: TrackerSettings) -> Belief:
     """Room for a few tracks of the filter in use."""
     slots, count = 16, settings.particles if settings.filter == "particle" else 0
+    rows = cloud.rows([_MODELS.index(model) for model in settings.models])
     return Belief(
         np.zeros(slots, np.int64),
-        np.zeros((slots, 4, count), np.float32),
+        np.zeros((slots, rows, count), np.float32),
         np.zeros((slots, count), np.float32),
         np.zeros((slots, count), np.uint8),
         np.zeros((slots, 0, 0)),
-        np.zeros((slots, 0, 0, 0)),
+        np.zeros((slots, *cloud.OPEN)),
         np.zeros((slots, 0)),
         normals(),
     )
