@@ -33,7 +33,7 @@ _LARGEST_EXPONENT = np.float32(87.0)
 
 
 @intrinsic  # type: ignore[misc]
-def _as_float(typing_context: Any, bits: Any) -> Any:
+def of_bits(typing_context: Any, bits: Any) -> Any:
     """The single-precision number of these 32 bits."""
 
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
@@ -43,7 +43,7 @@ def _as_float(typing_context: Any, bits: Any) -> Any:
 
 
 @intrinsic  # type: ignore[misc]
-def _as_bits(typing_context: Any, number: Any) -> Any:
+def to_bits(typing_context: Any, number: Any) -> Any:
     """The 32 bits of a single-precision number."""
 
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
@@ -104,9 +104,9 @@ def pairs_of_normals(key: Any, a: Singles, b: Singles) -> None:
     for i in range(a.size):
         u = (np.float32(np.int32(word[i] >> np.uint32(8))) + _HALF) * _TO_UNIT
         # u = m 2ᵉ with m in [√½, √2)
-        whole = _as_bits(u)
+        whole = to_bits(u)
         e = (whole - np.int32(0x3F3504F3)) >> np.int32(23)
-        m = _as_float(np.int32(whole - np.int32(e << np.int32(23)))) - _ONE
+        m = of_bits(np.int32(whole - np.int32(e << np.int32(23)))) - _ONE
         p = np.float32(0.0874394551)
         p = p * m + np.float32(-0.143773302)
         p = p * m + np.float32(0.149490952)
@@ -153,5 +153,5 @@ def exponential(x: Any) -> Any:
     p = p * r + np.float32(0.041666463)
     p = p * r + np.float32(0.166665763)
     p = p * r + _HALF
-    power = _as_float(np.int32((np.int32(n) + np.int32(127)) << np.int32(23)))
+    power = of_bits(np.int32((np.int32(n) + np.int32(127)) << np.int32(23)))
     return (p * r * r + r + _ONE) * power

@@ -30,7 +30,7 @@ from radar_console.estimation.draws import Singles as Singles
 from radar_console.estimation.gaussian import Array
 from radar_console.estimation.resampling import Indices
 
-_mix, _exponential = draws.mix, draws.exponential
+_mix, _exponential, _of_bits = draws.mix, draws.exponential, draws.of_bits
 
 BROAD = 64.0  # variance of an outlier, in units of the claimed one
 _NORMALS_BITS = 16
@@ -40,7 +40,6 @@ _ONE = np.float32(1.0)
 _HALF = np.float32(0.5)
 # Sums in any order, so that they vectorise; the same order every time.
 _SUMS = {"reassoc", "contract", "nsz"}
-_LEASTS = {"reassoc", "contract", "nsz", "nnan"}
 
 
 def normals() -> Singles:
@@ -183,23 +182,28 @@ def condition_on_nothing(S: Array, rest: float, terms: Singles) -> None:
     terms[ALONG] = terms[ACROSS] = math.sqrt(max(left - rest, 0.0))
 
 
-@njit(cache=True, nogil=True, error_model="numpy", fastmath=_LEASTS)
-def _distances(particles: Singles, lo: int, hi: int, z: Singles, terms: Singles, out: Singles) -> float:
-    """Fill `out` (N,) from `lo` to `hi` with the squared whitened innovations; returns the least."""
+@njit(cache=True, nogil=True, error_model="numpy")
+def _distances(particles: Singles, lo: int, hi: int, z: Singles, terms: Singles, out: Singles) -> None:
+    """Fill `out` (hi - lo,) with the squared whitened innovations of particles `lo` to `hi`."""
     z_a, z_b, rate, lag, u, v = z[Z_A], z[Z_B], z[Z_RATE], z[Z_LAG], z[Z_U], z[Z_V]
     w_aa, w_ba, w_bb = terms[W_AA], terms[W_BA], terms[W_BB]
     w_ra, w_rb, w_rr = terms[W_RA], terms[W_RB], terms[W_RR]
-    p_a, p_b, v_a, v_b = particles[0], particles[1], particles[2], particles[3]
-    nearest = np.float32(np.finfo(np.float32).max)
-    for i in range(lo, hi):
+    p_a, p_b, v_a, v_b = particles[0, lo:hi], particles[1, lo:hi], particles[2, lo:hi], particles[3, lo:hi]
+    for i in range(out.size):
         a = z_a - p_a[i] - lag * v_a[i]
         b = z_b - p_b[i] - lag * v_b[i]
         r = rate - u * v_a[i] - v * v_b[i]
         y_a, y_b, y_r = w_aa * a, w_ba * a + w_bb * b, w_ra * a + w_rb * b + w_rr * r
-        d2 = y_a * y_a + y_b * y_b + y_r * y_r
-        out[i] = d2
-        nearest = min(nearest, d2)
-    return nearest
+        out[i] = y_a * y_a + y_b * y_b + y_r * y_r
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _least(values: Singles) -> float:
+    """The least of values ≥ 0, which are in the order of their bits: integers compare in one go."""
+    bits, least = values.view(np.int32), np.int32(0x7F7FFFFF)  # the largest number
+    for i in range(bits.size):
+        least = min(least, bits[i])
+    return float(_of_bits(least))
 
 
 @njit(cache=True, nogil=True, error_model="numpy", fastmath=_SUMS)
@@ -252,13 +256,14 @@ def weigh(
     terms = np.empty(TERMS, np.float32)
     near = np.empty(relative.size, np.float32)
     log_near = condition(S, z, R, r, 1.0, 0.0, terms)
-    nearest = _distances(particles, 0, near.size, z, terms, near)
+    _distances(particles, 0, near.size, z, terms, near)
+    nearest = _least(near)
     if outliers > 0.0:
         far = np.empty(relative.size, np.float32)
         log_near += math.log(1.0 - outliers)
         log_far = math.log(outliers) + condition(S, z, R, r, BROAD, 0.0, terms)
-        farthest = _distances(particles, 0, far.size, z, terms, far)
-        shift = max(log_near - 0.5 * nearest, log_far - 0.5 * farthest)
+        _distances(particles, 0, far.size, z, terms, far)
+        shift = max(log_near - 0.5 * nearest, log_far - 0.5 * _least(far))
         total = _mixture(weights, near, far, log_near - shift, log_far - shift, relative)
     else:
         shift = log_near - 0.5 * nearest
@@ -282,10 +287,10 @@ def propose(
     a_ba, a_bb, a_br = terms[A_BA], terms[A_BB], terms[A_BR]
     c_aa, c_ba, c_bb = terms[C_AA], terms[C_BA], terms[C_BB]
     slope, gain = terms[SLOPE], terms[RATE_GAIN]
-    p_a, p_b, v_a, v_b = parents[0], parents[1], parents[2], parents[3]
-    to_a, to_b, to_va, to_vb = particles[0], particles[1], particles[2], particles[3]
-    n_a, n_b = noise[0], noise[1]
-    for k in range(lo, hi):
+    p_a, p_b, v_a, v_b = parents[0, lo:hi], parents[1, lo:hi], parents[2, lo:hi], parents[3, lo:hi]
+    to_a, to_b, n_a, n_b = particles[0, lo:hi], particles[1, lo:hi], noise[0, lo:hi], noise[1, lo:hi]
+    to_va, to_vb = particles[2, lo:hi], particles[3, lo:hi]
+    for k in range(hi - lo):
         a = z_a - p_a[k] - lag * v_a[k]
         b = z_b - p_b[k] - lag * v_b[k]
         r = rate - u * v_a[k] - v * v_b[k]
@@ -306,10 +311,11 @@ def shake(particles: Singles, lo: int, hi: int, z: Singles, terms: Singles, nois
     along, across, u, v = terms[ALONG], terms[ACROSS], z[Z_U], z[Z_V]
     if along <= 0.0 and across <= 0.0:
         return
-    for k in range(lo, hi):
-        a, b = along * noise[2, k], across * noise[3, k]
-        particles[2, k] += u * a - v * b
-        particles[3, k] += v * a + u * b
+    v_a, v_b, n_a, n_b = particles[2, lo:hi], particles[3, lo:hi], noise[2, lo:hi], noise[3, lo:hi]
+    for k in range(hi - lo):
+        a, b = along * n_a[k], across * n_b[k]
+        v_a[k] += u * a - v * b
+        v_b[k] += v * a + u * b
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -329,13 +335,14 @@ def are_outliers(
     `near` and `far` are the terms of the two densities, `log_odds` the log ratio of their factors;
     `found` (N,) is filled.
     """
-    d_near, d_far = np.empty(uniform.size, np.float32), np.empty(uniform.size, np.float32)
+    count = hi - lo
+    d_near, d_far = np.empty(count, np.float32), np.empty(count, np.float32)
     _distances(parents, lo, hi, z, near, d_near)
     _distances(parents, lo, hi, z, far, d_far)
-    shift = np.float32(log_odds)
-    for k in range(lo, hi):
+    shift, lot, odd = np.float32(log_odds), uniform[lo:hi], found[lo:hi]
+    for k in range(count):
         odds = _exponential(shift + _HALF * (d_far[k] - d_near[k]))
-        found[k] = uniform[k] * (_ONE + odds) < _ONE
+        odd[k] = lot[k] * (_ONE + odds) < _ONE
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
