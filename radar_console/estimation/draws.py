@@ -11,7 +11,7 @@ import math
 from typing import Any
 
 import numpy as np
-from llvmlite import ir
+from llvmlite import ir  # type: ignore[import-untyped]
 from numba import njit, types
 from numba.extending import intrinsic
 from numpy.typing import NDArray
@@ -32,24 +32,20 @@ _LARGEST_EXPONENT = np.float32(87.0)
 # ±½ ln 2, and of sin x/x and cos x on ±½π.
 
 
-@intrinsic  # type: ignore[misc]
-def of_bits(typing_context: Any, bits: Any) -> Any:
-    """The single-precision number of these 32 bits."""
+def _bitcast(source: Any, target: Any, width: Any) -> Any:
+    """A compiled function that takes the bits of one type for another's."""
 
-    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-        return builder.bitcast(arguments[0], ir.FloatType())
+    def declare(typing_context: Any, value: Any) -> Any:
+        def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+            return builder.bitcast(arguments[0], width)
 
-    return types.float32(types.int32), generate
+        return target(source), generate
+
+    return intrinsic(declare)
 
 
-@intrinsic  # type: ignore[misc]
-def to_bits(typing_context: Any, number: Any) -> Any:
-    """The 32 bits of a single-precision number."""
-
-    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-        return builder.bitcast(arguments[0], ir.IntType(32))
-
-    return types.int32(types.float32), generate
+of_bits = _bitcast(types.int32, types.float32, ir.FloatType())
+to_bits = _bitcast(types.float32, types.int32, ir.IntType(32))
 
 
 @njit(cache=True, nogil=True)

@@ -86,7 +86,8 @@ def _least_velocity_variance(P: Array) -> float:
         for k in range(2):
             C[i, k] = P[2 + i, 2 + k] - g_a * P[2 + k, 0] - g_b * P[2 + k, 1]
     middle = 0.5 * (C[0, 0] + C[1, 1])
-    return max(middle - math.hypot(0.5 * (C[0, 0] - C[1, 1]), C[0, 1]), 0.0)
+    least: float = max(middle - math.hypot(0.5 * (C[0, 0] - C[1, 1]), C[0, 1]), 0.0)
+    return least
 
 
 @njit(cache=True, nogil=True, error_model="numpy")

@@ -47,10 +47,11 @@ _PI = np.float32(math.pi)
 _INVERSE_PI = np.float32(1.0 / math.pi)
 _ONE, _HALF = np.float32(1.0), np.float32(0.5)
 
-# Columns of a table of models over an interval: the parameter decays by RHO and is driven by SD; what the
-# old and the new acceleration do to position and velocity; the probability that the model is left.
-RHO, SD, P_OLD, P_NEW, V_OLD, V_NEW, LEAVE = range(7)
-_COLUMNS = 7
+# Columns of a table of models over an interval: by what the turn rate decays, and the deviation that drives
+# it; the same of the acceleration; what the old and the new acceleration do to position and velocity; the
+# probability that the model is left.
+TURN_DECAY, TURN_SD, PULL_DECAY, PULL_SD, P_OLD, P_NEW, V_OLD, V_NEW, LEAVE = range(9)
+_COLUMNS = 9
 
 
 def rows(models: Sequence[int]) -> int:
@@ -91,7 +92,7 @@ def _singer(T: float, tau: float, Q: Array) -> None:
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def _prepare(par: Any, T: float, Q: Array, table: Singles) -> None:
-    """Fill `table` (models, 7) for `T` s, and the noise Q (2, 2) of position and velocity.
+    """Fill `table` (models, 9) for `T` s, and the noise Q (2, 2) of position and velocity.
 
     An acceleration that goes from a to a' moves the particle by its mean course between the two; what
     the course wanders about that (Brownian or Ornstein-Uhlenbeck bridge) is noise.
@@ -104,7 +105,7 @@ def _prepare(par: Any, T: float, Q: Array, table: Singles) -> None:
         table[k, LEAVE] = -math.expm1(-par.leave[k] * T) if par.models > 1 else 0.0
         decay = 1.0 if model == CA else math.exp(-T / tau)
         if model == CT:
-            table[k, RHO], table[k, SD] = decay, par.turn_rate * math.sqrt(1.0 - decay * decay)
+            table[k, TURN_DECAY], table[k, TURN_SD] = decay, par.turn_rate * math.sqrt(1.0 - decay * decay)
         elif model == CA or model == SINGER:
             jerk = 2.0 * par.manoeuvre * par.manoeuvre / tau
             _singer(T, math.inf if model == CA else tau, q3)
@@ -113,7 +114,7 @@ def _prepare(par: Any, T: float, Q: Array, table: Singles) -> None:
             else:
                 p, v = tau * tau * (T / tau - 1.0 + decay), tau * (1.0 - decay)
             b_p, b_v = (q3[0, 2] / q3[2, 2], q3[1, 2] / q3[2, 2]) if T > 0.0 else (0.0, 0.0)
-            table[k, RHO], table[k, SD] = decay, math.sqrt(jerk * q3[2, 2])
+            table[k, PULL_DECAY], table[k, PULL_SD] = decay, math.sqrt(jerk * q3[2, 2])
             table[k, P_OLD], table[k, P_NEW] = p - decay * b_p, b_p
             table[k, V_OLD], table[k, V_NEW] = v - decay * b_v, b_v
             if par.models == 1:
@@ -229,7 +230,7 @@ def advance(
         old = np.empty((2, model.size), np.float32)
         if turns:
             _pairs_of_normals(_mix(key + np.uint64(1)), a, b)
-            _drive(particles[4], model, table, a, old[0])
+            _drive(particles[4], model, table, TURN_DECAY, TURN_SD, a, old[0])
             _turn(particles, velocity, old[0], T)
         else:
             straight(particles, T)
@@ -237,17 +238,20 @@ def advance(
             _pairs_of_normals(_mix(key + np.uint64(2)), a, b)
             row = 5 if turns else 4
             for axis in range(2):
-                _drive(particles[row + axis], model, table, a if axis == 0 else b, old[axis])
+                noise = a if axis == 0 else b
+                _drive(particles[row + axis], model, table, PULL_DECAY, PULL_SD, noise, old[axis])
                 _pull(particles, axis, old[axis], particles[row + axis], model, table)
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _drive(parameter: Singles, model: Models, table: Singles, noise: Singles, old: Singles) -> None:
-    """Let a parameter of the manoeuvres decay and be driven; `old` keeps what it was."""
+def _drive(
+    parameter: Singles, model: Models, table: Singles, decay: int, sd: int, noise: Singles, old: Singles
+) -> None:
+    """Let a parameter of the manoeuvres decay and be driven, by these columns; `old` keeps what it was."""
     for i in range(parameter.size):
         k = model[i]
         old[i] = parameter[i]
-        parameter[i] = table[k, RHO] * old[i] + table[k, SD] * noise[i]
+        parameter[i] = table[k, decay] * old[i] + table[k, sd] * noise[i]
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -293,14 +297,15 @@ def _openness(par: Any, T: float, table: Singles, lateral: Singles, everyway: Si
     """
     fresh = np.zeros((par.models, 2))
     for k in range(par.models):
-        rho, sd, kind = float(table[k, RHO]), float(table[k, SD]), par.model[k]
+        kind = par.model[k]
         lateral[k] = everyway[k] = 0.0
         stay = 1.0 - float(table[k, LEAVE])
         if kind == CT:
-            reach = 0.25 * T * T
+            rho, sd, reach = float(table[k, TURN_DECAY]), float(table[k, TURN_SD]), 0.25 * T * T
             lateral[k] = stay * (reach * sd) ** 2
             fresh[k, 0] = (reach * (1.0 + rho) * par.turn_rate) ** 2 + (reach * sd) ** 2
         elif kind == CA or kind == SINGER:
+            rho, sd = float(table[k, PULL_DECAY]), float(table[k, PULL_SD])
             old, new = float(table[k, P_OLD]), float(table[k, P_NEW])
             everyway[k] = stay * (new * sd) ** 2
             fresh[k, 1] = ((old + rho * new) * par.manoeuvre) ** 2 + (new * sd) ** 2
@@ -343,11 +348,11 @@ def forecast(
         a, b = np.float32(velocity[0]) + particles[2, i], np.float32(velocity[1]) + particles[3, i]
         m_a = m_b = np.float32(0.0)
         if turns:
-            along, aside, _, _ = _arc(np.float32(0.25 * T) * (_ONE + table[k, RHO]) * particles[4, i])
+            along, aside, _, _ = _arc(np.float32(0.25 * T) * (_ONE + table[k, TURN_DECAY]) * particles[4, i])
             m_a += step * (along * a - aside * b - a)
             m_b += step * (aside * a + along * b - b)
         if pulls:
-            pull = table[k, P_OLD] + table[k, RHO] * table[k, P_NEW]
+            pull = table[k, P_OLD] + table[k, PULL_DECAY] * table[k, P_NEW]
             m_a += pull * particles[row, i]
             m_b += pull * particles[row + 1, i]
         stay = _ONE - table[k, LEAVE]
