@@ -94,7 +94,7 @@ def _comb(scheme: int, key: Any, comb: Array) -> None:
     points = np.empty(n, np.float32)
     _uniforms(key, points)
     one = float(_mix(key) >> np.uint64(11)) * _TO_UNIT
-    if scheme == SYSTEMATIC or scheme == STRATIFIED:
+    if scheme in (SYSTEMATIC, STRATIFIED):
         for k in range(n):
             comb[k] = (k + (one if scheme == SYSTEMATIC else points[k])) / n
         return

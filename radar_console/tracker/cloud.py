@@ -280,11 +280,13 @@ def _propose_cloud(
     if not _plain(par):
         model[:] = model[ancestors]
     Z, R, r = np.empty((m, _MEASURED), np.float32), np.empty((m, 3)), np.empty(m)
-    _, rest = _given_position(S)
+    least_r = math.inf
     for j in range(m):
         r[j] = _measure(track, pool[chosen[j]], par, Z[j], R[j])
-    rest = 0.0 if par.proposal != ADAPTED else rest / (1.0 + rest / r.min())
-    shaken = par.proposal != ADAPTED or r.min() < math.inf
+        least_r = min(least_r, r[j])
+    _, rest = _given_position(S)
+    rest = 0.0 if par.proposal != ADAPTED else rest / (1.0 + rest / least_r)
+    shaken = par.proposal != ADAPTED or least_r < math.inf
     if shaken:
         _pairs_of_normals(_mix(key + np.uint64(1)), noise[2], noise[3])
     near = np.empty(_TERMS, np.float32)
@@ -321,8 +323,8 @@ def _propose_cloud(
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def _propose_plot(
-    parents: Singles, lo: int, hi: int, S: Array, z: Singles, R: Array, r: float, rest: float, outliers: float,
-    uniform: Singles, odd: Any, noise: Singles, shaken: bool, particles: Singles,
+    parents: Singles, lo: int, hi: int, S: Array, z: Singles, R: Array, r: float, rest: float,
+    outliers: float, uniform: Singles, odd: Any, noise: Singles, shaken: bool, particles: Singles,
 ) -> None:  # fmt: skip
     """Draw particles `lo` to `hi` given one plot; to some of them it is an outlier."""
     near, far = np.empty(_TERMS, np.float32), np.empty(_TERMS, np.float32)

@@ -67,10 +67,10 @@ def plain(par: Any) -> bool:
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def _has(par: Any, a: int, b: int) -> bool:
+    found = False
     for k in range(par.models):
-        if par.model[k] == a or par.model[k] == b:
-            return True
-    return False
+        found = found or par.model[k] == a or par.model[k] == b
+    return found
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -106,7 +106,7 @@ def _prepare(par: Any, T: float, Q: Array, table: Singles) -> None:
         decay = 1.0 if model == CA else math.exp(-T / tau)
         if model == CT:
             table[k, TURN_DECAY], table[k, TURN_SD] = decay, par.turn_rate * math.sqrt(1.0 - decay * decay)
-        elif model == CA or model == SINGER:
+        elif model in (CA, SINGER):
             jerk = 2.0 * par.manoeuvre * par.manoeuvre / tau
             _singer(T, math.inf if model == CA else tau, q3)
             if model == CA or T < _SMALL * tau:
@@ -158,7 +158,7 @@ def _engage(particles: Singles, model: Models, fresh: Any, key: Any, par: Any) -
         if turns:
             particles[4, i] = par.turn_rate * a[i] if kind == CT else 0.0
         if pulls:
-            rms = par.manoeuvre if kind == CA or kind == SINGER else 0.0
+            rms = par.manoeuvre if kind in (CA, SINGER) else 0.0
             particles[row, i] = rms * a[i]
             particles[row + 1, i] = rms * b[i]
 
@@ -304,7 +304,7 @@ def _openness(par: Any, T: float, table: Singles, lateral: Singles, everyway: Si
             rho, sd, reach = float(table[k, TURN_DECAY]), float(table[k, TURN_SD]), 0.25 * T * T
             lateral[k] = stay * (reach * sd) ** 2
             fresh[k, 0] = (reach * (1.0 + rho) * par.turn_rate) ** 2 + (reach * sd) ** 2
-        elif kind == CA or kind == SINGER:
+        elif kind in (CA, SINGER):
             rho, sd = float(table[k, PULL_DECAY]), float(table[k, PULL_SD])
             old, new = float(table[k, P_OLD]), float(table[k, P_NEW])
             everyway[k] = stay * (new * sd) ** 2
@@ -317,7 +317,7 @@ def _openness(par: Any, T: float, table: Singles, lateral: Singles, everyway: Si
                 everyway[k] += part * fresh[other, 1]
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@njit(cache=True, nogil=True, error_model="numpy", fastmath={"reassoc", "contract", "nsz"})
 def forecast(
     particles: Singles,
     weights: Singles,
@@ -341,34 +341,37 @@ def forecast(
     _openness(par, T, table, lateral, everyway)
     turns, pulls = _has(par, CT, CT), _has(par, CA, SINGER)
     row = 5 if turns else 4
-    count, step = model.size, np.float32(T)
-    ahead, extra = np.empty((2, count), np.float32), np.zeros(3)
-    for i in range(count):
+    step, quarter = np.float32(T), np.float32(0.25 * T)
+    u_a, u_b = np.float32(velocity[0]), np.float32(velocity[1])
+    p_a, p_b, v_a, v_b, rate = particles[0], particles[1], particles[2], particles[3], particles[4]
+    pull_a, pull_b = (particles[row], particles[row + 1]) if pulls else (rate, rate)
+    ahead_a, ahead_b = np.empty(model.size, np.float32), np.empty(model.size, np.float32)
+    open_aa = open_ab = open_bb = mean_a = mean_b = np.float32(0.0)
+    for i in range(model.size):
         k, w = model[i], weights[i]
-        a, b = np.float32(velocity[0]) + particles[2, i], np.float32(velocity[1]) + particles[3, i]
+        a, b = u_a + v_a[i], u_b + v_b[i]
         m_a = m_b = np.float32(0.0)
         if turns:
-            along, aside, _, _ = _arc(np.float32(0.25 * T) * (_ONE + table[k, TURN_DECAY]) * particles[4, i])
+            along, aside, _, _ = _arc(quarter * (_ONE + table[k, TURN_DECAY]) * rate[i])
             m_a += step * (along * a - aside * b - a)
             m_b += step * (aside * a + along * b - b)
         if pulls:
             pull = table[k, P_OLD] + table[k, PULL_DECAY] * table[k, P_NEW]
-            m_a += pull * particles[row, i]
-            m_b += pull * particles[row + 1, i]
+            m_a += pull * pull_a[i]
+            m_b += pull * pull_b[i]
         stay = _ONE - table[k, LEAVE]
         part = stay * table[k, LEAVE]
-        ahead[0, i] = particles[0, i] + step * particles[2, i] + stay * m_a
-        ahead[1, i] = particles[1, i] + step * particles[3, i] + stay * m_b
-        extra[0] += w * (part * m_a * m_a + lateral[k] * b * b + everyway[k])
-        extra[1] += w * (part * m_a * m_b - lateral[k] * a * b)
-        extra[2] += w * (part * m_b * m_b + lateral[k] * a * a + everyway[k])
-    mean[:] = 0.0
-    for i in range(count):
-        mean[0] += weights[i] * ahead[0, i]
-        mean[1] += weights[i] * ahead[1, i]
-    cov[:] = extra
-    for i in range(count):
-        a, b = ahead[0, i] - mean[0], ahead[1, i] - mean[1]
-        cov[0] += weights[i] * a * a
-        cov[1] += weights[i] * a * b
-        cov[2] += weights[i] * b * b
+        ahead_a[i] = p_a[i] + step * v_a[i] + stay * m_a
+        ahead_b[i] = p_b[i] + step * v_b[i] + stay * m_b
+        mean_a += w * ahead_a[i]
+        mean_b += w * ahead_b[i]
+        open_aa += w * (part * m_a * m_a + lateral[k] * b * b + everyway[k])
+        open_ab += w * (part * m_a * m_b - lateral[k] * a * b)
+        open_bb += w * (part * m_b * m_b + lateral[k] * a * a + everyway[k])
+    for i in range(model.size):
+        a, b, w = ahead_a[i] - mean_a, ahead_b[i] - mean_b, weights[i]
+        open_aa += w * a * a
+        open_ab += w * a * b
+        open_bb += w * b * b
+    mean[0], mean[1] = mean_a, mean_b
+    cov[0], cov[1], cov[2] = open_aa, open_ab, open_bb
