@@ -1,12 +1,21 @@
-"""The bootstrap particle filter of one track; its particles move in the plane.
+"""The particle filter of one track; its particles move in the plane.
 
-Particles are float32 *offsets* (4, N) from a float64 anchor that moves with them: east, north,
-v_east, v_north, turned into axes of the track's own, so that a rotated scene is tracked alike.
-Weights (N,) are float32 and sum to 1. Random numbers have no state: particle i of a step draws
-from a hash of (key, i), so nothing depends on the order of the work or the number of threads.
+Particles are float32 *offsets* (rows, N) from a float64 anchor that moves with them: east, north,
+v_east, v_north, turned into axes of the track's own, so that a rotated scene is tracked alike; what
+manoeuvring particles have beside these is in further rows, see `manoeuvres`. Weights (N,) are float32
+and sum to 1.
 
-Sources: Gordon, Salmond, Smith, Novel approach to nonlinear/non-Gaussian Bayesian state estimation,
-IEE Proc. F 140(2), 1993; Arulampalam et al., A tutorial on particle filters, IEEE T-SP 50(2), 2002.
+A particle stands for a Gaussian: all share the *rest* S (2, 2), covariance of position and velocity
+along any axis, which is what the particles leave open. The bootstrap filter [1] draws everything as it
+predicts, and S is 0. With the optimal proposal [2, §V-C] the noise of one step is open until a plot has
+come. The adapted filter leaves the velocity open for good (Rao and Blackwell): given the positions that
+were drawn it is a Gaussian, whose covariance does not depend on the measurements [3].
+
+[1] Gordon, Salmond, Smith, Novel approach to nonlinear/non-Gaussian Bayesian state estimation,
+    IEE Proc. F 140(2), 1993.
+[2] Arulampalam et al., A tutorial on particle filters, IEEE T-SP 50(2), 2002.
+[3] Schön, Gustafsson, Nordlund, Marginalized particle filters for mixed linear/nonlinear state-space
+    models, IEEE T-SP 53(7), 2005.
 """
 
 import math
@@ -14,16 +23,23 @@ from typing import Any
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 from scipy.special import ndtri
 
+from radar_console.estimation import draws
+from radar_console.estimation.draws import Singles as Singles
 from radar_console.estimation.gaussian import Array
+from radar_console.estimation.resampling import Indices
 
-Singles = NDArray[np.float32]
+_mix, _exponential, _of_bits = draws.mix, draws.exponential, draws.of_bits
 
+BROAD = 64.0  # variance of an outlier, in units of the claimed one
 _NORMALS_BITS = 16
 _LEAST = 1e-30  # of a sum of weights
-BROAD = 64.0  # variance of an outlier, in units of the claimed one
+_TURN = 2.0 * math.pi
+_ONE = np.float32(1.0)
+_HALF = np.float32(0.5)
+# Sums in any order, so that they vectorise; the same order every time.
+_SUMS = {"reassoc", "contract", "nsz"}
 
 
 def normals() -> Singles:
@@ -37,27 +53,12 @@ def normals() -> Singles:
     return np.asarray(values / values.std(), np.float32)
 
 
-@njit(cache=True, nogil=True)
-def mix(z: Any) -> Any:
-    """64 well mixed bits (Steele, Lea, Flood, Fast splittable pseudorandom number generators, 2014)."""
-    z = np.uint64(z) + np.uint64(0x9E3779B97F4A7C15)
-    z = (z ^ (z >> np.uint64(30))) * np.uint64(0xBF58476D1CE4E5B9)
-    z = (z ^ (z >> np.uint64(27))) * np.uint64(0x94D049BB133111EB)
-    return z ^ (z >> np.uint64(31))
-
-
-@njit(cache=True, nogil=True)
-def key(seed: int, track: int, step: int) -> Any:
-    """The random key of one step of one track."""
-    return mix(mix(mix(np.uint64(seed)) ^ np.uint64(track)) ^ np.uint64(step))
-
-
 @njit(cache=True, nogil=True, error_model="numpy")
 def draw(particles: Singles, L: Array, key: Any, table: Singles) -> None:
-    """Fill `particles` (4, N) from N(0, L Lᵀ), L (4, 4) lower triangular."""
+    """Fill the first rows of `particles` (≥ 4, N) from N(0, L Lᵀ), L (4, 4) lower triangular."""
     low = np.uint64(0xFFFF)
     for i in range(particles.shape[1]):
-        bits = mix(key + np.uint64(i))
+        bits = _mix(key + np.uint64(i))
         a = table[bits & low]
         b = table[(bits >> np.uint64(16)) & low]
         c = table[(bits >> np.uint64(32)) & low]
@@ -69,83 +70,324 @@ def draw(particles: Singles, L: Array, key: Any, table: Singles) -> None:
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def predict(particles: Singles, T: float, q: float, key: Any, table: Singles) -> None:
-    """Nearly constant velocity over `T` s, white acceleration of spectral density `q` m²/s³."""
-    low = np.uint64(0xFFFF)
-    step, half = np.float32(T), np.float32(0.5 * T)
-    s_v, s_p = np.float32(math.sqrt(q * T)), np.float32(math.sqrt(q * T * T * T / 12.0))
-    for i in range(particles.shape[1]):
-        bits = mix(key + np.uint64(i))
-        for axis in range(2):
-            v = particles[2 + axis, i]
-            dv = s_v * table[bits & low]
-            bits >>= np.uint64(16)
-            particles[axis, i] += step * v + half * dv + s_p * table[bits & low]
-            bits >>= np.uint64(16)
-            particles[2 + axis, i] = v + dv
+def diffuse(particles: Singles, S: Array, noise: Singles) -> None:
+    """Draw from the rest what the particles left open, and leave nothing; `noise` (4, N)."""
+    if S[1, 1] > 0.0:
+        slope, s_v = np.float32(S[0, 1] / S[1, 1]), np.float32(math.sqrt(S[1, 1]))
+    else:
+        slope, s_v = np.float32(0.0), np.float32(0.0)
+    s_p = np.float32(math.sqrt(max(S[0, 0] - float(slope) * S[0, 1], 0.0)))
+    for axis in range(2):
+        p, v, first, second = particles[axis], particles[2 + axis], noise[axis], noise[2 + axis]
+        for i in range(p.size):
+            dv = s_v * first[i]
+            p[i] += slope * dv + s_p * second[i]
+            v[i] += dv
+    S[:] = 0.0
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def grow(S: Array, T: float, Q: Array) -> None:
+    """Predict the rest over `T` s: F S Fᵀ + Q."""
+    pp, pv, vv = S[0, 0], S[0, 1], S[1, 1]
+    S[0, 0] = pp + 2.0 * T * pv + T * T * vv + Q[0, 0]
+    S[0, 1] = S[1, 0] = pv + T * vv + Q[0, 1]
+    S[1, 1] = vv + Q[1, 1]
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def given_position(S: Array) -> tuple[float, float]:
+    """Regression of velocity on position, 1/s, and the variance that is left of the velocity."""
+    c = S[0, 1] / S[0, 0] if S[0, 0] > 0.0 else 0.0
+    return c, max(S[1, 1] - c * S[0, 1], 0.0)
+
+
+# Of a measurement z, as float32: position (2), range rate, lag, and the line of sight (2).
+Z_A, Z_B, Z_RATE, Z_LAG, Z_U, Z_V = range(6)
+MEASURED = 6
+# What a particle does with it: whitening W (3, 3), lower triangular; gain A (2, 3) on the whitened
+# innovation; factor C (2, 2) of the position's posterior covariance; regression of velocity on position;
+# gain of the range rate; deviations of what is drawn of the velocity, along and across the line of sight.
+(
+    W_AA, W_BA, W_BB, W_RA, W_RB, W_RR, A_AA, A_AB, A_AR, A_BA, A_BB, A_BR, C_AA, C_BA, C_BB,
+    SLOPE, RATE_GAIN, ALONG, ACROSS,
+) = range(19)  # fmt: skip
+TERMS = 19
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def condition(S: Array, z: Singles, R: Array, r: float, scale: float, rest: float, terms: Singles) -> float:
+    """Prepare a measurement: position of covariance `scale` R, range rate of variance `scale` r.
+
+    Both are seen `lag` s after the particles' time. The position is drawn from its exact posterior;
+    of what a lag tells about the velocity beyond that, a share of order (lag / T)² is let go.
+
+    Parameters
+    ----------
+    S : (2, 2) rest of the particles
+    z : (6,) the measurement
+    R : (3,) aa, ab, bb, in the track's axes
+    r : variance of the range rate; infinite where there is none
+    rest : variance of the velocity that the next step's particles leave open
+    terms : (19,) filled; named above
+
+    Returns
+    -------
+    log of the density's normalising factor
+    """
+    lag, u, v = float(z[Z_LAG]), float(z[Z_U]), float(z[Z_V])
+    pv = S[0, 1] + lag * S[1, 1]
+    pp = S[0, 0] + lag * (S[0, 1] + pv)
+    aa, ab, bb = pp + scale * R[0], scale * R[1], pp + scale * R[2]
+    l_aa = math.sqrt(aa)
+    l_ba = ab / l_aa
+    l_bb = math.sqrt(max(bb - l_ba * l_ba, 1e-12 * bb))
+    w_aa, w_bb = 1.0 / l_aa, 1.0 / l_bb
+    w_ba = -l_ba * w_aa * w_bb
+    log_norm = math.log(w_aa * w_bb / _TURN)
+    slope, left = given_position(S)
+    w_ra = w_rb = w_rr = cross_a = cross_b = rate_gain = 0.0
+    if r < math.inf:
+        g_a, g_b = w_aa * pv * u, w_ba * pv * u + w_bb * pv * v
+        l_rr = math.sqrt(max(S[1, 1] - g_a * g_a - g_b * g_b, 0.0) + scale * r)
+        w_rr = 1.0 / l_rr
+        w_ra, w_rb = -(g_a * w_aa + g_b * w_ba) * w_rr, -g_b * w_bb * w_rr
+        log_norm += math.log(w_rr / math.sqrt(_TURN))
+        rate_gain = left / (left + scale * r)
+        cross_a, cross_b = S[0, 1] * u, S[0, 1] * v
+    k = S[0, 0] + lag * S[0, 1]
+    a_aa, a_ab, a_ar = k * w_aa, k * w_ba, k * w_ra + cross_a * w_rr
+    a_ba, a_bb, a_br = 0.0, k * w_bb, k * w_rb + cross_b * w_rr
+    c_aa = math.sqrt(max(S[0, 0] - a_aa * a_aa - a_ab * a_ab - a_ar * a_ar, 0.0))
+    c_ba = -(a_aa * a_ba + a_ab * a_bb + a_ar * a_br) / c_aa if c_aa > 0.0 else 0.0
+    c_bb = math.sqrt(max(S[0, 0] - a_ba * a_ba - a_bb * a_bb - a_br * a_br - c_ba * c_ba, 0.0))
+    terms[W_AA], terms[W_BA], terms[W_BB] = w_aa, w_ba, w_bb
+    terms[W_RA], terms[W_RB], terms[W_RR] = w_ra, w_rb, w_rr
+    terms[A_AA], terms[A_AB], terms[A_AR] = a_aa, a_ab, a_ar
+    terms[A_BA], terms[A_BB], terms[A_BR] = a_ba, a_bb, a_br
+    terms[C_AA], terms[C_BA], terms[C_BB] = c_aa, c_ba, c_bb
+    terms[SLOPE], terms[RATE_GAIN] = slope, rate_gain
+    terms[ALONG] = math.sqrt(max(left * (1.0 - rate_gain) - rest, 0.0))
+    terms[ACROSS] = math.sqrt(max(left - rest, 0.0))
+    return log_norm
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def condition_on_nothing(S: Array, rest: float, terms: Singles) -> None:
+    """Prepare for the alternative that none of the measurements is the target's."""
+    slope, left = given_position(S)
+    terms[:] = 0.0
+    terms[C_AA] = terms[C_BB] = math.sqrt(S[0, 0])
+    terms[SLOPE] = slope
+    terms[ALONG] = terms[ACROSS] = math.sqrt(max(left - rest, 0.0))
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _distances(particles: Singles, lo: int, hi: int, z: Singles, terms: Singles, out: Singles) -> None:
+    """Fill `out` (hi - lo,) with the squared whitened innovations of particles `lo` to `hi`."""
+    z_a, z_b, rate, lag, u, v = z[Z_A], z[Z_B], z[Z_RATE], z[Z_LAG], z[Z_U], z[Z_V]
+    w_aa, w_ba, w_bb = terms[W_AA], terms[W_BA], terms[W_BB]
+    w_ra, w_rb, w_rr = terms[W_RA], terms[W_RB], terms[W_RR]
+    p_a, p_b, v_a, v_b = particles[0, lo:hi], particles[1, lo:hi], particles[2, lo:hi], particles[3, lo:hi]
+    for i in range(out.size):
+        a = z_a - p_a[i] - lag * v_a[i]
+        b = z_b - p_b[i] - lag * v_b[i]
+        r = rate - u * v_a[i] - v * v_b[i]
+        y_a, y_b, y_r = w_aa * a, w_ba * a + w_bb * b, w_ra * a + w_rb * b + w_rr * r
+        out[i] = y_a * y_a + y_b * y_b + y_r * y_r
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _least(values: Singles) -> float:
+    """The least of values ≥ 0, which are in the order of their bits: integers compare in one go."""
+    bits, least = values.view(np.int32), np.int32(0x7F7FFFFF)  # the largest number
+    for i in range(bits.size):
+        least = min(least, bits[i])
+    return float(_of_bits(least))
+
+
+@njit(cache=True, nogil=True, error_model="numpy", fastmath=_SUMS)
+def _mixture(
+    weights: Singles, near: Singles, far: Singles, log_near: float, log_far: float, relative: Singles
+) -> float:
+    """Fill `relative` (N,) with exp(log_near - near/2) + exp(log_far - far/2); Σ w `relative`."""
+    first, second = np.float32(log_near), np.float32(log_far)
+    total = 0.0
+    for i in range(relative.size):
+        g = _exponential(first - _HALF * near[i]) + _exponential(second - _HALF * far[i])
+        relative[i] = g
+        total += weights[i] * g
+    return total
+
+
+@njit(cache=True, nogil=True, error_model="numpy", fastmath=_SUMS)
+def _gaussian(weights: Singles, near: Singles, log_near: float, relative: Singles) -> float:
+    """Fill `relative` (N,) with exp(log_near - near/2); Σ w `relative`."""
+    first = np.float32(log_near)
+    total = 0.0
+    for i in range(relative.size):
+        g = _exponential(first - _HALF * near[i])
+        relative[i] = g
+        total += weights[i] * g
+    return total
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def weigh(
     particles: Singles,
     weights: Singles,
-    z: Array,
+    S: Array,
+    z: Singles,
     R: Array,
-    lag: float,
+    r: float,
     outliers: float,
     relative: Singles,
 ) -> tuple[float, float]:
-    """Likelihood of each particle for a position seen `lag` s after the particles' time.
+    """Likelihood of each particle for a measurement; parameters as in `condition`.
 
-    The measurement's density is (1 - ε) N(z; x, R) + ε N(z; x, 64 R): a plot that was merged with a
-    neighbour's must not carry the whole cloud away. ε = 0 is the Gaussian.
-
-    Parameters
-    ----------
-    z : (2,) offset of the measurement from the anchor at its own time, in the track's axes
-    R : (3,) its covariance there: aa, ab, bb
-    outliers : ε, in [0, 1)
+    The measurement's density is (1 - ε) N(z; H x, R) + ε N(z; H x, 64 R): a plot that was merged with
+    a neighbour's must not carry the whole cloud away. ε = `outliers` = 0 is the Gaussian.
 
     Returns
     -------
     log ĝ = log Σ w_i g(x_i), and Σ w_i `relative`_i, where `relative` (N,) is filled with the
     particles' likelihoods up to a common factor: nothing underflows, however far z is out.
     """
-    # R = L Lᵀ; the whitened difference is L⁻¹ (z - x).
-    l_aa = math.sqrt(R[0])
-    l_ab = R[1] / l_aa
-    l_bb = math.sqrt(max(R[2] - l_ab * l_ab, 1e-12 * R[2]))
-    i_aa, i_bb = np.float32(1.0 / l_aa), np.float32(1.0 / l_bb)
-    i_ab = np.float32(-l_ab / (l_aa * l_bb))
-    z_a, z_b, t = np.float32(z[0]), np.float32(z[1]), np.float32(lag)
-    count = particles.shape[1]
-    nearest = np.float32(np.inf)
-    for i in range(count):
-        a = z_a - particles[0, i] - t * particles[2, i]
-        b = z_b - particles[1, i] - t * particles[3, i]
-        u, v = i_aa * a, i_ab * a + i_bb * b
-        d2 = u * u + v * v
-        relative[i] = d2
-        nearest = min(nearest, d2)
-    # With y the broad component, the narrow one is y^64, both relative to the nearest particle's;
-    # the larger of their factors is 1.
-    log_narrow = -0.5 * (1.0 - 1.0 / BROAD) * float(nearest)
-    log_broad = math.log(outliers / ((1.0 - outliers) * BROAD)) if outliers > 0.0 else -math.inf
-    log_factor = max(log_narrow, log_broad)
-    narrow = np.float32(math.exp(log_narrow - log_factor))
-    broad = np.float32(math.exp(log_broad - log_factor))
-    scale = np.float32(0.5 / BROAD)
-    total = 0.0
-    for i in range(count):
-        y = np.float32(math.exp(scale * (nearest - relative[i])))
-        y4 = (y * y) * (y * y)
-        y16 = (y4 * y4) * (y4 * y4)
-        g = narrow * (y16 * y16) * (y16 * y16) + broad * y
-        relative[i] = g
-        total += weights[i] * g
+    terms = np.empty(TERMS, np.float32)
+    near = np.empty(relative.size, np.float32)
+    log_near = condition(S, z, R, r, 1.0, 0.0, terms)
+    _distances(particles, 0, near.size, z, terms, near)
+    nearest = _least(near)
+    if outliers > 0.0:
+        far = np.empty(relative.size, np.float32)
+        log_near += math.log(1.0 - outliers)
+        log_far = math.log(outliers) + condition(S, z, R, r, BROAD, 0.0, terms)
+        _distances(particles, 0, far.size, z, terms, far)
+        shift = max(log_near - 0.5 * nearest, log_far - 0.5 * _least(far))
+        total = _mixture(weights, near, far, log_near - shift, log_far - shift, relative)
+    else:
+        shift = log_near - 0.5 * nearest
+        total = _gaussian(weights, near, log_near - shift, relative)
     total = max(total, _LEAST)
-    log_norm = log_factor + math.log((1.0 - outliers) / (2.0 * math.pi * l_aa * l_bb))
-    return math.log(total) - 0.5 * float(nearest) / BROAD + log_norm, total
+    return math.log(total) + shift, total
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def propose(
+    parents: Singles, lo: int, hi: int, z: Singles, terms: Singles, noise: Singles, particles: Singles
+) -> None:
+    """Draw particles `lo` to `hi` from their posterior, given their parents and one measurement.
+
+    `parents` (4, N) predicted; `noise` (≥ 2, N) standard normals; `particles` are filled.
+    """
+    z_a, z_b, rate, lag, u, v = z[Z_A], z[Z_B], z[Z_RATE], z[Z_LAG], z[Z_U], z[Z_V]
+    w_aa, w_ba, w_bb = terms[W_AA], terms[W_BA], terms[W_BB]
+    w_ra, w_rb, w_rr = terms[W_RA], terms[W_RB], terms[W_RR]
+    a_aa, a_ab, a_ar = terms[A_AA], terms[A_AB], terms[A_AR]
+    a_ba, a_bb, a_br = terms[A_BA], terms[A_BB], terms[A_BR]
+    c_aa, c_ba, c_bb = terms[C_AA], terms[C_BA], terms[C_BB]
+    slope, gain = terms[SLOPE], terms[RATE_GAIN]
+    p_a, p_b, v_a, v_b = parents[0, lo:hi], parents[1, lo:hi], parents[2, lo:hi], parents[3, lo:hi]
+    to_a, to_b, n_a, n_b = particles[0, lo:hi], particles[1, lo:hi], noise[0, lo:hi], noise[1, lo:hi]
+    to_va, to_vb = particles[2, lo:hi], particles[3, lo:hi]
+    for k in range(hi - lo):
+        a = z_a - p_a[k] - lag * v_a[k]
+        b = z_b - p_b[k] - lag * v_b[k]
+        r = rate - u * v_a[k] - v * v_b[k]
+        y_a, y_b, y_r = w_aa * a, w_ba * a + w_bb * b, w_ra * a + w_rb * b + w_rr * r
+        d_a = a_aa * y_a + a_ab * y_b + a_ar * y_r + c_aa * n_a[k]
+        d_b = a_ba * y_a + a_bb * y_b + a_br * y_r + c_ba * n_a[k] + c_bb * n_b[k]
+        new_a, new_b = v_a[k] + slope * d_a, v_b[k] + slope * d_b
+        e = gain * (rate - u * new_a - v * new_b)
+        to_a[k] = p_a[k] + d_a
+        to_b[k] = p_b[k] + d_b
+        to_va[k] = new_a + u * e
+        to_vb[k] = new_b + v * e
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def shake(particles: Singles, lo: int, hi: int, z: Singles, terms: Singles, noise: Singles) -> None:
+    """Draw what particles `lo` to `hi` are not to leave open of the velocity; `noise` (4, N)."""
+    along, across, u, v = terms[ALONG], terms[ACROSS], z[Z_U], z[Z_V]
+    if along <= 0.0 and across <= 0.0:
+        return
+    v_a, v_b, n_a, n_b = particles[2, lo:hi], particles[3, lo:hi], noise[2, lo:hi], noise[3, lo:hi]
+    for k in range(hi - lo):
+        a, b = along * n_a[k], across * n_b[k]
+        v_a[k] += u * a - v * b
+        v_b[k] += v * a + u * b
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def are_outliers(
+    parents: Singles,
+    lo: int,
+    hi: int,
+    z: Singles,
+    near: Singles,
+    far: Singles,
+    log_odds: float,
+    uniform: Singles,
+    found: Any,
+) -> None:
+    """Draw for particles `lo` to `hi` whether their measurement was an outlier.
+
+    `near` and `far` are the terms of the two densities, `log_odds` the log ratio of their factors;
+    `found` (N,) is filled.
+    """
+    count = hi - lo
+    d_near, d_far = np.empty(count, np.float32), np.empty(count, np.float32)
+    _distances(parents, lo, hi, z, near, d_near)
+    _distances(parents, lo, hi, z, far, d_far)
+    shift, lot, odd = np.float32(log_odds), uniform[lo:hi], found[lo:hi]
+    for k in range(count):
+        odds = _exponential(shift + _HALF * (d_far[k] - d_near[k]))
+        odd[k] = lot[k] * (_ONE + odds) < _ONE
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def gather(source: Singles, ancestors: Indices, out: Singles) -> None:
+    """Copy each ancestor's column of `source` (rows, N) to `out` (rows, N)."""
+    for row in range(source.shape[0]):
+        values, copies = source[row], out[row]
+        for k in range(ancestors.size):
+            copies[k] = values[ancestors[k]]
+
+
+@njit(cache=True, nogil=True, error_model="numpy", fastmath=_SUMS)
+def centre(particles: Singles, weights: Singles, mean: Array, cov: Array) -> None:
+    """Subtract the weighted mean; fill `mean` (4,) and `cov` (4, 4)."""
+    p_a, p_b, v_a, v_b = particles[0], particles[1], particles[2], particles[3]
+    m_a = m_b = m_va = m_vb = np.float32(0.0)
+    for i in range(weights.size):
+        w = weights[i]
+        m_a += w * p_a[i]
+        m_b += w * p_b[i]
+        m_va += w * v_a[i]
+        m_vb += w * v_b[i]
+    aa = ab = bb = aa_v = ab_v = ba_v = bb_v = vaa = vab = vbb = np.float32(0.0)
+    for i in range(weights.size):
+        w, a, b, c, d = weights[i], p_a[i] - m_a, p_b[i] - m_b, v_a[i] - m_va, v_b[i] - m_vb
+        p_a[i], p_b[i], v_a[i], v_b[i] = a, b, c, d
+        wa, wb, wc = w * a, w * b, w * c
+        aa += wa * a
+        ab += wa * b
+        bb += wb * b
+        aa_v += wa * c
+        ab_v += wa * d
+        ba_v += wb * c
+        bb_v += wb * d
+        vaa += wc * c
+        vab += wc * d
+        vbb += w * d * d
+    mean[0], mean[1], mean[2], mean[3] = m_a, m_b, m_va, m_vb
+    cov[0, 0], cov[1, 1], cov[2, 2], cov[3, 3] = aa, bb, vaa, vbb
+    cov[0, 1] = cov[1, 0] = ab
+    cov[0, 2] = cov[2, 0] = aa_v
+    cov[0, 3] = cov[3, 0] = ab_v
+    cov[1, 2] = cov[2, 1] = ba_v
+    cov[1, 3] = cov[3, 1] = bb_v
+    cov[2, 3] = cov[3, 2] = vab
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -163,48 +405,13 @@ def normalise(weights: Singles) -> float:
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def resample(particles: Singles, weights: Singles, key: Any, scratch: Singles) -> None:
-    """Systematic resampling: comb of N teeth, one uniform start; `scratch` (4, N)."""
-    count = weights.size
-    tooth = float(mix(key) >> np.uint64(11)) / 9007199254740992.0  # 2^53
-    i, cumulative = 0, float(weights[0]) * count
-    for j in range(count):
-        while cumulative < tooth + j and i < count - 1:
-            i += 1
-            cumulative += float(weights[i]) * count
-        for row in range(4):
-            scratch[row, j] = particles[row, i]
-    particles[:] = scratch
-    weights[:] = np.float32(1.0 / count)
-
-
-@njit(cache=True, nogil=True, error_model="numpy")
-def moments(particles: Singles, weights: Singles, mean: Array, cov: Array) -> None:
-    """Fill the weighted mean (4,) and covariance (4, 4) of the offsets."""
-    mean[:] = 0.0
-    for row in range(4):
-        m = 0.0
-        for i in range(weights.size):
-            m += weights[i] * particles[row, i]
-        mean[row] = m
-    for row in range(4):
-        for column in range(row + 1):
-            m, n = mean[row], mean[column]
-            total = 0.0
-            for i in range(weights.size):
-                total += weights[i] * (particles[row, i] - m) * (particles[column, i] - n)
-            cov[row, column] = total
-            cov[column, row] = total
-
-
-@njit(cache=True, nogil=True, error_model="numpy")
 def regularise(
-    particles: Singles, mean: Array, cov: Array, width: float, key: Any, table: Singles, scratch: Singles
+    particles: Singles, cov: Array, width: float, key: Any, table: Singles, scratch: Singles
 ) -> None:
     """Part the copies that resampling made: a kernel of `width` times the cloud's own spread.
 
-    The cloud is shrunk toward its mean by √(1 - width²) first, so that mean and covariance stay
-    what they were. It is left as offsets from `mean` (4,), which the anchor has to take over.
+    The cloud, whose mean is 0, is shrunk by √(1 - width²) first, so that mean and covariance `cov`
+    (4, 4) stay what they were. `scratch` (4, N).
 
     Source: Liu and West, Combined parameter and state estimation in simulation-based filtering, in
     Sequential Monte Carlo Methods in Practice, 2001, §10.3.
@@ -214,9 +421,8 @@ def regularise(
     draw(scratch, width * L, key, table)
     shrink = np.float32(math.sqrt(1.0 - width * width))
     for row in range(4):
-        m = np.float32(mean[row])
         for i in range(particles.shape[1]):
-            particles[row, i] = shrink * (particles[row, i] - m) + scratch[row, i]
+            particles[row, i] = shrink * particles[row, i] + scratch[row, i]
 
 
 @njit(cache=True, nogil=True, error_model="numpy")

@@ -2,8 +2,8 @@
 
 Every centroid counts with the part of it that no confirmed track has used. The map over range and
 azimuth forgets with a time constant of `1 / (1 - MEMORY)` turns; a cell's estimate is the mean of a
-gamma posterior, whose prior is the mean over the whole coverage, itself with the prior of one false
-centroid a turn. Clutter can be far smaller than a cell, and move. So
+gamma posterior, whose prior is the mean density at a centroid: where one is, others are likelier
+than elsewhere. Clutter can be far smaller than a cell, and move. So
 for each centroid those are counted that the beam met around it just before: a target gives one
 centroid a turn, so they are others. The mean of these counts over the centroids of a cell says how
 dense clutter is where there is any, and what a track met on its way how dense it is around the track.
@@ -19,7 +19,7 @@ from radar_console.tracker.records import N_PAST, World
 
 RINGS, COLUMNS = 32, 64
 MEMORY = 0.9
-PRIOR_TURNS = 0.5
+PRIOR = 1.0  # count that the density at the centroids of the whole coverage is worth
 CROWD_PRIOR = 0.5  # counts that the map's density is worth, as a guess of the density at centroids
 LOCAL_PRIOR = 2.0  # counts that the density at the centroids of the cell is worth, as a guess for a track
 TRACK_MEMORY = 0.9
@@ -34,8 +34,8 @@ MAP = np.dtype(
         ("fresh_near", "f8", (RINGS, COLUMNS)),  # of this turn
         ("fresh_area", "f8", (RINGS, COLUMNS)),
         ("turns", "f8", (COLUMNS,)),  # forgetful number of turns
-        ("total", "f8"),
-        ("exposure", "f8"),  # column-turns
+        ("pairs", "f8"),  # centroids with another one in their cell and turn, forgetful sum
+        ("pairs_area", "f8"),  # m², over the centroids the areas of their cells
         ("last", "i8"),  # unwrapped number of the column that was last entered
     ]
 )
@@ -55,18 +55,21 @@ def place(e: float, n: float, max_range: float) -> tuple[int, int]:
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def turn_to(clutter: Any, phi: float) -> None:
+def turn_to(clutter: Any, phi: float, max_range: float) -> None:
     """Take over the columns that the beam has left behind by the unwrapped angle `phi`."""
     now = math.floor(phi / (2.0 * math.pi) * COLUMNS)
     clutter.last = max(clutter.last, now - COLUMNS)
     while clutter.last < now:
         column = clutter.last % COLUMNS
         clutter.last += 1
-        clutter.exposure += 1.0 - (1.0 - MEMORY) * clutter.turns[column]
+        forget = MEMORY ** (1.0 / COLUMNS)
+        clutter.pairs *= forget
+        clutter.pairs_area *= forget
         clutter.turns[column] = MEMORY * clutter.turns[column] + 1.0
         for ring in range(RINGS):
             fresh = clutter.fresh[ring, column]
-            clutter.total += fresh - (1.0 - MEMORY) * clutter.count[ring, column]
+            clutter.pairs += fresh * max(fresh - 1.0, 0.0)
+            clutter.pairs_area += fresh * _area(ring, max_range)
             clutter.count[ring, column] = MEMORY * clutter.count[ring, column] + fresh
             clutter.fresh[ring, column] = 0.0
             clutter.near[ring, column] *= MEMORY
@@ -77,15 +80,22 @@ def turn_to(clutter: Any, phi: float) -> None:
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def estimate(clutter: Any, e: float, n: float, max_range: float) -> float:
-    """False centroids per m² and turn at a position relative to the sensor."""
-    wedge = math.pi / COLUMNS  # half the angle of a column: the area is half the angle times r²
-    mean = (max(clutter.total, 0.0) + 1.0) / (wedge * max_range * max_range * (clutter.exposure + COLUMNS))
-    ring, column = place(e, n, max_range)
+def _area(ring: int, max_range: float) -> float:
+    """Of a cell, m²."""
     width = max_range / RINGS
-    area = wedge * width * width * (2.0 * ring + 1.0)
+    return math.pi / COLUMNS * width * width * (2.0 * ring + 1.0)
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def estimate(clutter: Any, e: float, n: float, max_range: float) -> float:
+    """False centroids per m² and turn at a position relative to the sensor, where there is a centroid."""
+    whole = math.pi * max_range * max_range  # with one centroid a turn in it, before any was seen
+    cell = whole / (RINGS * COLUMNS)
+    crowd = (max(clutter.pairs, 0.0) + cell / whole) / (max(clutter.pairs_area, 0.0) + cell)
+    ring, column = place(e, n, max_range)
+    area = _area(ring, max_range)
     count = max(clutter.count[ring, column], 0.0)
-    density: float = (count + PRIOR_TURNS * mean * area) / (area * (clutter.turns[column] + PRIOR_TURNS))
+    density: float = (count + PRIOR) / (area * clutter.turns[column] + PRIOR / crowd)
     return density
 
 

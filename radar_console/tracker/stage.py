@@ -22,7 +22,7 @@ from radar_console.estimation.gaussian import Array
 from radar_console.estimation.measurement import from_polar
 from radar_console.estimation.particle import normals
 from radar_console.scenario import TrackerSettings
-from radar_console.tracker import clutter, gating, modes
+from radar_console.tracker import cloud, clutter, gating, modes
 from radar_console.tracker.association.choose import KINDS
 from radar_console.tracker.clusters import associate, step, weigh
 from radar_console.tracker.management import adopt
@@ -421,18 +421,21 @@ def _parameters(settings: TrackerSettings, radar: Radar, seed: int) -> NDArray[n
 
 def _empty_world(settings: TrackerSettings, radar: Radar, seed: int) -> World:
     """Room for a few tracks, none of them there."""
-    count = settings.particles if settings.filter == "particle" else 0
     slots, par = 16, _parameters(settings, radar, seed)[0]
     models = par["model"][: par["models"]]
-    many, n = modes.count(int(par["filter"]), models), modes.state_size(models)
+    if settings.filter == "particle":
+        count, rows, gaussians = settings.particles, cloud.rows(models), cloud.OPEN
+    else:
+        n = modes.state_size(models)
+        count, rows, gaussians = 0, 0, (modes.count(int(par["filter"]), models), n, n)
     belief = Belief(
         np.zeros(slots, np.int64),
-        np.zeros((slots, 4, count), np.float32),
+        np.zeros((slots, rows, count), np.float32),
         np.zeros((slots, count), np.float32),
         np.zeros((slots, count), np.uint8),
-        np.zeros((slots, many, n)),
-        np.zeros((slots, many, n, n)),
-        np.zeros((slots, many)),
+        np.zeros((slots, *gaussians[:2])),
+        np.zeros((slots, *gaussians)),
+        np.zeros((slots, gaussians[0])),
         normals(),
     )
     return World(

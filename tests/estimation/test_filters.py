@@ -7,15 +7,10 @@ import filterpy.kalman
 import numpy as np
 import pytest
 
-from radar_console.estimation import kalman, measurement, motion, particle
-from radar_console.estimation.gaussian import Gaussian, collapse, log_density
+from radar_console.estimation import kalman, measurement, motion
+from radar_console.estimation.gaussian import Gaussian, collapse
 
 H = np.eye(2, 4)
-TABLE = particle.normals()
-
-
-def key(*numbers):
-    return np.uint64(particle.key(*numbers))
 
 
 def random_gaussian(rng, *shape):
@@ -104,113 +99,3 @@ def test_converted_measurements_are_unbiased_and_their_covariance_is_theirs(sd_a
 def test_range_zero_has_a_proper_covariance():
     z = measurement.from_polar(0.0, 1.0, 50.0, 0.002)
     assert np.all(np.linalg.eigvalsh(z.cov) > 0)
-
-
-def test_the_table_has_the_moments_of_the_normal():
-    values = TABLE.astype(float)
-    assert abs(values.mean()) < 1e-6
-    assert abs(values.var() - 1) < 1e-6
-    assert abs((values**4).mean() - 3) < 3e-3
-
-
-def test_draws_of_neighbouring_particles_tracks_and_steps_are_independent():
-    n = 20_000
-    clouds = np.empty((3, 4, n), np.float32)
-    for cloud, (track, step) in zip(clouds, ((1, 1), (2, 1), (1, 2)), strict=True):
-        particle.draw(cloud, np.eye(4), key(5, track, step), TABLE)
-    rows = np.concatenate([*clouds, clouds[0][:, np.arange(n) - 1]])
-    correlation = np.corrcoef(rows) - np.eye(16)
-    assert np.abs(correlation).max() < 4.5 / math.sqrt(n)
-
-
-def run_both(rng, particles, turns=25):
-    """A track of the model's own kind: errors of the Kalman filter and of the particle filter."""
-    F, Q = motion.constant_velocity(4.0, 1.0)
-    R = np.diag([50.0**2, 80.0**2])
-    prior = Gaussian(np.zeros(4), np.diag([50.0, 80.0, 20.0, 20.0]) ** 2)
-    truth = prior.mean + np.linalg.cholesky(prior.cov) @ rng.normal(size=4)
-    cloud, weights = np.empty((4, particles), np.float32), np.full(particles, 1 / particles, np.float32)
-    relative, scratch = np.empty(particles, np.float32), np.empty((4, particles), np.float32)
-    mean, cov = np.empty(4), np.empty((4, 4))
-    seed, kf, errors = int(rng.integers(1 << 40)), prior, []
-    particle.draw(cloud, np.linalg.cholesky(prior.cov), key(seed, 0, 0), TABLE)
-    anchor = np.zeros(4)
-    for k in range(1, turns):
-        truth = F @ truth + np.linalg.cholesky(Q) @ rng.normal(size=4)
-        z = truth[:2] + np.sqrt(np.diag(R)) * rng.normal(size=2)
-        kf, _ = kalman.update(kalman.predict(kf, F, Q), z, H, R)
-        anchor = F @ anchor
-        particle.predict(cloud, 4.0, 1.0, key(seed, 0, k), TABLE)
-        particle.weigh(cloud, weights, z - anchor[:2], np.array([R[0, 0], 0.0, R[1, 1]]), 0.0, 0.0, relative)
-        weights *= relative
-        effective = particle.normalise(weights)
-        particle.moments(cloud, weights, mean, cov)
-        errors.append([kf.mean - truth, anchor + mean - truth])
-        if effective < 0.5 * particles:
-            particle.resample(cloud, weights, key(seed, 1, k), scratch)
-            particle.regularise(cloud, mean, cov, 0.25, key(seed, 2, k), TABLE, scratch)
-            anchor = anchor + mean
-    return np.array(errors)
-
-
-def test_on_a_linear_model_the_particle_filter_is_the_kalman_filter():
-    """100 runs, 1,000 particles: RMSE of the position within 3 %; the bound is the specification's."""
-    rng = np.random.default_rng(6)
-    errors = np.array([run_both(rng, 1000) for _ in range(100)])
-    rmse = np.sqrt((errors[..., :2] ** 2).sum(-1).mean((0, 1)))
-    assert rmse[1] / rmse[0] < 1.03
-
-
-def test_weigh_is_the_mixture_of_two_gaussians():
-    rng, n = np.random.default_rng(7), 500
-    cloud, weights = rng.normal(size=(4, n)).astype(np.float32), rng.random(n).astype(np.float32)
-    particle.normalise(weights)
-    relative = np.empty(n, np.float32)
-    z, R = np.array([1.0, -2.0]), np.array([[2.0, 0.4], [0.4, 1.0]])
-    nu = z - (cloud[:2] + 0.5 * cloud[2:]).T
-    g = 0.9 * np.exp(log_density(nu, R)) + 0.1 * np.exp(log_density(nu, particle.BROAD * R))
-    found, total = particle.weigh(cloud, weights, z, np.array([2.0, 0.4, 1.0]), 0.5, 0.1, relative)
-    assert found == pytest.approx(math.log(np.sum(weights * g)), abs=1e-5)
-    assert np.allclose(relative / relative.sum(), g / g.sum(), rtol=1e-4)
-    assert total == pytest.approx(np.sum(weights * relative), rel=1e-5)
-
-
-@pytest.mark.parametrize("outliers", [0.0, 0.05])
-def test_a_measurement_far_out_does_not_underflow(outliers):
-    n = 100
-    cloud, weights = np.zeros((4, n), np.float32), np.full(n, 1 / n, np.float32)
-    cloud[0] = np.linspace(-1, 1, n)
-    relative = np.empty(n, np.float32)
-    found, total = particle.weigh(
-        cloud, weights, np.array([1e4, 0.0]), np.array([1.0, 0.0, 1.0]), 0.0, outliers, relative
-    )
-    assert math.isfinite(found)
-    assert total > 0
-    assert np.all(np.isfinite(relative))
-
-
-def test_systematic_resampling_copies_in_proportion():
-    n = 1000
-    rng = np.random.default_rng(8)
-    weights = rng.random(n).astype(np.float32) ** 4
-    particle.normalise(weights)
-    expected = n * weights.astype(float)
-    cloud = np.tile(np.arange(n, dtype=np.float32), (4, 1))
-    particle.resample(cloud, weights, key(1, 2, 3), np.empty((4, n), np.float32))
-    copies = np.bincount(cloud[0].astype(int), minlength=n)
-    assert np.all(np.abs(copies - expected) <= 1.001)
-    assert np.all(weights == np.float32(1 / n))
-
-
-def test_regularising_keeps_mean_and_covariance():
-    n = 100_000
-    cloud, scratch = np.empty((4, n), np.float32), np.empty((4, n), np.float32)
-    L = np.linalg.cholesky(random_gaussian(np.random.default_rng(9)).cov)
-    particle.draw(cloud, L, key(1, 1, 1), TABLE)
-    weights, mean, cov = np.full(n, 1 / n, np.float32), np.empty(4), np.empty((4, 4))
-    particle.moments(cloud, weights, mean, cov)
-    particle.regularise(cloud, mean, cov, 0.25, key(1, 1, 2), TABLE, scratch)
-    after, cov2 = np.empty(4), np.empty((4, 4))
-    particle.moments(cloud, weights, after, cov2)
-    assert np.all(np.abs(after) < 0.01 * np.sqrt(np.diag(cov)))
-    assert np.allclose(cov2, cov, rtol=0, atol=0.02 * np.sqrt(np.outer(np.diag(cov), np.diag(cov))))
