@@ -1,12 +1,11 @@
-"""The density of false centroids, estimated live: a map, and what lay around each one lately.
+"""The density of false centroids, estimated live, where there are centroids.
 
-Every centroid counts with the part of it that no confirmed track has used. The map over range and
-azimuth forgets with a time constant of `1 / (1 - MEMORY)` turns; a cell's estimate is the mean of a
-gamma posterior, whose prior is the mean density at a centroid: where one is, others are likelier
-than elsewhere. Clutter can be far smaller than a cell, and move. So
-for each centroid those are counted that the beam met around it just before: a target gives one
-centroid a turn, so they are others. The mean of these counts over the centroids of a cell says how
-dense clutter is where there is any, and what a track met on its way how dense it is around the track.
+For each centroid those are counted that the beam met around it just before: a target gives one
+centroid a turn, so they are others. Their mean over an area is the density of clutter as a track
+there meets it, however small and quick the patches are that clutter comes in. Three such means
+sharpen each other, each the prior of the next: over the whole coverage; over the cells of a map of
+range and azimuth, which forgets with a time constant of `1 / (1 - MEMORY)` turns; and over what a
+track met on its way. Each is the mean of a gamma posterior.
 """
 
 import math
@@ -18,24 +17,18 @@ from numba import njit
 from radar_console.tracker.records import N_PAST, World
 
 RINGS, COLUMNS = 32, 64
-MEMORY = 0.9
-PRIOR = 1.0  # count that the density at the centroids of the whole coverage is worth
-CROWD_PRIOR = 0.5  # counts that the map's density is worth, as a guess of the density at centroids
-LOCAL_PRIOR = 2.0  # counts that the density at the centroids of the cell is worth, as a guess for a track
-TRACK_MEMORY = 0.9
+MEMORY = 0.9  # of the map, for a turn
+TRACK_MEMORY = 0.9  # of a track, for a pass
+# Counts that a prior is worth: of nothing, of the coverage, and of the cell.
+FIRST_PRIOR, CELL_PRIOR, TRACK_PRIOR = 0.3, 0.5, 2.0
 _LEAST_DENSITY = 1e-15  # m⁻²
 
 MAP = np.dtype(
     [
-        ("count", "f8", (RINGS, COLUMNS)),  # forgetful sums over turns
-        ("fresh", "f8", (RINGS, COLUMNS)),  # of this turn
-        ("near", "f8", (RINGS, COLUMNS)),  # neighbours of the centroids, forgetful sums
+        ("near", "f8", (RINGS, COLUMNS)),  # neighbours of the centroids, forgetful sums over turns
         ("area", "f8", (RINGS, COLUMNS)),  # m² where they were counted
-        ("fresh_near", "f8", (RINGS, COLUMNS)),  # of this turn
-        ("fresh_area", "f8", (RINGS, COLUMNS)),
-        ("turns", "f8", (COLUMNS,)),  # forgetful number of turns
-        ("pairs", "f8"),  # centroids with another one in their cell and turn, forgetful sum
-        ("pairs_area", "f8"),  # m², over the centroids the areas of their cells
+        ("all_near", "f8"),  # the sums of these
+        ("all_area", "f8"),
         ("last", "i8"),  # unwrapped number of the column that was last entered
     ]
 )
@@ -55,48 +48,18 @@ def place(e: float, n: float, max_range: float) -> tuple[int, int]:
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def turn_to(clutter: Any, phi: float, max_range: float) -> None:
-    """Take over the columns that the beam has left behind by the unwrapped angle `phi`."""
+def turn_to(clutter: Any, phi: float) -> None:
+    """Forget a part of each column that the beam enters on its way to the unwrapped angle `phi`."""
     now = math.floor(phi / (2.0 * math.pi) * COLUMNS)
     clutter.last = max(clutter.last, now - COLUMNS)
     while clutter.last < now:
-        column = clutter.last % COLUMNS
         clutter.last += 1
-        forget = MEMORY ** (1.0 / COLUMNS)
-        clutter.pairs *= forget
-        clutter.pairs_area *= forget
-        clutter.turns[column] = MEMORY * clutter.turns[column] + 1.0
+        column = clutter.last % COLUMNS
         for ring in range(RINGS):
-            fresh = clutter.fresh[ring, column]
-            clutter.pairs += fresh * max(fresh - 1.0, 0.0)
-            clutter.pairs_area += fresh * _area(ring, max_range)
-            clutter.count[ring, column] = MEMORY * clutter.count[ring, column] + fresh
-            clutter.fresh[ring, column] = 0.0
+            clutter.all_near -= (1.0 - MEMORY) * clutter.near[ring, column]
+            clutter.all_area -= (1.0 - MEMORY) * clutter.area[ring, column]
             clutter.near[ring, column] *= MEMORY
-            clutter.near[ring, column] += clutter.fresh_near[ring, column]
             clutter.area[ring, column] *= MEMORY
-            clutter.area[ring, column] += clutter.fresh_area[ring, column]
-            clutter.fresh_near[ring, column] = clutter.fresh_area[ring, column] = 0.0
-
-
-@njit(cache=True, nogil=True, error_model="numpy")
-def _area(ring: int, max_range: float) -> float:
-    """Of a cell, m²."""
-    width = max_range / RINGS
-    return math.pi / COLUMNS * width * width * (2.0 * ring + 1.0)
-
-
-@njit(cache=True, nogil=True, error_model="numpy")
-def estimate(clutter: Any, e: float, n: float, max_range: float) -> float:
-    """False centroids per m² and turn at a position relative to the sensor, where there is a centroid."""
-    whole = math.pi * max_range * max_range  # with one centroid a turn in it, before any was seen
-    cell = whole / (RINGS * COLUMNS)
-    crowd = (max(clutter.pairs, 0.0) + cell / whole) / (max(clutter.pairs_area, 0.0) + cell)
-    ring, column = place(e, n, max_range)
-    area = _area(ring, max_range)
-    count = max(clutter.count[ring, column], 0.0)
-    density: float = (count + PRIOR) / (area * clutter.turns[column] + PRIOR / crowd)
-    return density
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -115,14 +78,17 @@ def survey(plot: Any, beam: Any, w: World) -> None:
         i += 1
     plot.base = par.clutter
     if math.isnan(plot.base):
-        density = max(estimate(clutter, de, dn, par.max_range), _LEAST_DENSITY)
+        everywhere = max(clutter.all_near, 0.0) + FIRST_PRIOR
+        everywhere /= max(clutter.all_area, 0.0) + plot.exposure
         ring, column = place(de, dn, par.max_range)
-        near = clutter.near[ring, column] + clutter.fresh_near[ring, column] + CROWD_PRIOR
-        area = clutter.area[ring, column] + clutter.fresh_area[ring, column] + CROWD_PRIOR / density
-        plot.base = near / area
+        plot.base = (clutter.near[ring, column] + CELL_PRIOR) / (
+            clutter.area[ring, column] + CELL_PRIOR / everywhere
+        )
         if not plot.extended:
-            clutter.fresh_near[ring, column] += plot.near
-            clutter.fresh_area[ring, column] += plot.exposure
+            clutter.near[ring, column] += plot.near
+            clutter.area[ring, column] += plot.exposure
+            clutter.all_near += plot.near
+            clutter.all_area += plot.exposure
     plot.base = max(plot.base, _LEAST_DENSITY)
     if not plot.extended:
         newest = past[size[N_PAST]]
@@ -148,7 +114,7 @@ def density_at(plot: Any, near: float, exposure: float, par: Any) -> float:
     """λ, m⁻² and turn, at a plot, for a track that met `near` others in `exposure` m² and turns."""
     if not math.isnan(par.clutter):
         return float(plot.base)
-    density: float = (near + plot.near + LOCAL_PRIOR) / (exposure + plot.exposure + LOCAL_PRIOR / plot.base)
+    density: float = (near + plot.near + TRACK_PRIOR) / (exposure + plot.exposure + TRACK_PRIOR / plot.base)
     return density
 
 

@@ -90,7 +90,7 @@ def close_bin(beam: Any, w: World, final: bool) -> None:
             track.served = track.swept = False
     _purge(w)
     _bury(w)
-    _turn_to(w.clutter, beam.phi, w.par.max_range)
+    _turn_to(w.clutter, beam.phi)
     _forget(beam.phi, w)
     w.size[N_PHASE] = 0
 

@@ -36,7 +36,7 @@ from radar_console.tracker.records import (
 )
 
 _BROAD = particle.BROAD
-_density_of, _MARGIN, _place = gating.density_of, gating.MARGIN, clutter.place
+_density_of, _MARGIN = gating.density_of, gating.MARGIN
 _density_at = clutter.density_at
 _evidence, _update_height = clusters.evidence, height.update
 _serve, _begin, _kill, _report = management.serve, management.begin, management.kill, management.report
@@ -231,7 +231,7 @@ def retire(beam: Any, w: World) -> None:
         else:
             moved[p] = -1
             taken = plot.head >= 0 and _merge(plot, beam, w)
-            _start(plot, not taken, beam, w)
+            _start(plot, not taken, w)
     size[N_POOL] = n
     n = 0
     for k in range(size[N_EDGES]):
@@ -333,15 +333,12 @@ def _absorb(stays: int, ends: Any, same: bool, w: World) -> None:
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _start(plot: Any, free: bool, beam: Any, w: World) -> None:
-    """Count a plot as clutter as far as no confirmed track has used it; a `free` one starts a track."""
+def _start(plot: Any, free: bool, w: World) -> None:
+    """Let a `free` plot that no confirmed track has used start a track."""
     if plot.extended:
         w.tally[C_EXTENDED] += 1
         return
     par = w.par
-    e, n = plot.e - beam.e, plot.n - beam.n
-    ring, column = _place(e, n, par.max_range)
-    w.clutter.fresh[ring, column] += plot.weight
     if free and plot.weight >= 0.5:
         reach = par.max_speed * par.turn
         crowd = _density_at(plot, 0.0, 0.0, par) * math.pi * reach * reach
