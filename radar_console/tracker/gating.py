@@ -91,11 +91,11 @@ def look(track: Any, wake: Any, beam: Any, par: Any) -> None:
     if ahead <= 0.0 or h == math.pi or track.claims:
         wake[0] = wake[1] = -math.inf
         return
-    # Half of what is ahead is left to the target's motion, and to the growth of its gate.
+    # A fifth of what is ahead is left to the target's motion, and to the growth of its gate.
     x, P = track.x, track.P
     speed = math.hypot(x[2], x[3]) + 10.0 * math.sqrt(P[2, 2] + P[3, 3]) + par.max_speed
-    wake[0] = beam.phi + 0.5 * ahead
-    wake[1] = beam.t + min(0.25 * ahead, 0.5) * r / speed
+    wake[0] = beam.phi + 0.8 * ahead
+    wake[1] = beam.t + min(0.1 * ahead, 0.5) * r / speed
 
 
 @njit(cache=True, nogil=True, error_model="numpy")

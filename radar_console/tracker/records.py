@@ -54,7 +54,8 @@ STATE = np.dtype(
         ("swept", "?"),
         ("served", "?"),  # in this bin
         ("dead", "?"),
-    ]
+    ],
+    align=True,
 )
 """A track."""
 
@@ -87,7 +88,8 @@ PENDING = np.dtype(
         ("near", "f8"),  # centroids around it that the beam met just before,
         ("exposure", "f8"),  # and m² where they were counted
         ("base", "f8"),  # m⁻², density of false centroids at such places
-    ]
+    ],
+    align=True,
 )
 """A centroid that waits for its bin, or for the tracks that claim it."""
 
@@ -101,7 +103,8 @@ EDGE = np.dtype(
         ("density", "f8"),  # Gaussian likelihood, m⁻²
         ("spent", "?"),  # its track was served
         ("next", "i8"),  # scratch: of the same track, or of the same plot
-    ]
+    ],
+    align=True,
 )
 """A plot in a track's gate; it stays until all who claim the plot are served."""
 
@@ -113,7 +116,8 @@ MEMBER = np.dtype(
         ("kept", "i8"),  # how many of them the association kept; they stand first
         ("used", "f8"),  # Σ β
         ("rough", "?"),  # associated approximately
-    ]
+    ],
+    align=True,
 )
 """A confirmed track whose cluster is associated in this bin."""
 
@@ -127,7 +131,9 @@ PAIR = np.dtype(
 )
 """A member and a plot in its gate."""
 
-BEAM = np.dtype([("phi", "f8"), ("t", "f8"), ("e", "f8"), ("n", "f8"), ("step", "f8"), ("seen", "?")])
+BEAM = np.dtype(
+    [("phi", "f8"), ("t", "f8"), ("e", "f8"), ("n", "f8"), ("step", "f8"), ("seen", "?")], align=True
+)
 """A bin's end: beam angle, time, position of the sensor; how long it took, and whether the radar looked."""
 
 PARAMETERS = np.dtype(

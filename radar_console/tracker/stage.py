@@ -15,16 +15,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from radar_console.core.geometry import ground_range
-from radar_console.core.messages import CENTROID, NO_TRACKS, TRACK, CentroidFlag, Radar, Sector, Table
+from radar_console.core.messages import CENTROID, NO_TRACKS, TRACK, Radar, Sector, Table
 from radar_console.core.units import TURN
 from radar_console.estimation.gaussian import Array
-from radar_console.estimation.measurement import from_polar
 from radar_console.estimation.particle import normals
 from radar_console.scenario import TrackerSettings
 from radar_console.tracker import cloud, clutter, gating, modes
 from radar_console.tracker.association.choose import KINDS
 from radar_console.tracker.clusters import associate, step, weigh
+from radar_console.tracker.intake import bins, merge, take
 from radar_console.tracker.management import adopt
 from radar_console.tracker.records import (
     BEAM,
@@ -63,8 +62,6 @@ _MOST_THREADS = 4
 _MANY_TRACKS = 100  # from which on threads are worth their trouble
 _LEAST_SHARE = 4  # members for each thread
 _CLIMB_NOISE = 1.0  # m²/s³, of the rate of climb
-_GRID = 2.0**20  # per s and per m: interpolated values are rounded, so that no cut shows in them
-_SD_HEIGHT = 30.0  # m, of a reported height
 _LOG = 2048  # sectors that are remembered, to find where the beam was
 _FEW_TURNS = 4
 
@@ -104,7 +101,8 @@ class Tracker:
     def __init__(
         self, settings: TrackerSettings, radar: Radar, seed: int, threads: int | None = None
     ) -> None:
-        self.settings, self.radar, self.counts = settings, radar, Counts()
+        self.settings, self.radar, self._counts = settings, radar, Counts()
+        self._above_sea = radar.site.height if radar.site else 0.0
         self._world = _empty_world(settings, radar, seed)
         self._queue = np.zeros(0, PENDING)
         self._log = _BeamLog()
@@ -112,6 +110,13 @@ class Tracker:
         self._last: Sector | None = None
         self._threads = min(os.cpu_count() or 1, _MOST_THREADS) if threads is None else threads
         self._pool: ThreadPoolExecutor | None = None
+
+    @property
+    def counts(self) -> Counts:
+        """What has been done so far."""
+        for name, value in zip(SWEPT_COUNTS, self._world.tally.tolist(), strict=True):
+            setattr(self._counts, name, value)
+        return self._counts
 
     def __call__(self, sectors: Iterable[Sector]) -> Iterator[Sector]:
         """Add the rows of all services to the sectors that completed them."""
@@ -124,9 +129,9 @@ class Tracker:
     def push(self, sector: Sector) -> Sector:
         """The sector, with a row for each track that was served by it, hit or missed."""
         if sector.stop < sector.start or (self._last and sector.start < self._last.stop):
-            self.counts.clock_back += 1
+            self._counts.clock_back += 1
         if sector.end < sector.begin or (self._last and sector.end < self._last.end):
-            self.counts.beam_back += 1
+            self._counts.beam_back += 1
         self._log.append(sector)
         if self._next_bin is None:
             self._next_bin = math.floor(self._log.angle[0] / self._bin) + 1
@@ -135,7 +140,8 @@ class Tracker:
         if len(sector.centroids):
             self._take(sector)
         self._last = sector
-        return sector.adding(tracks=self._run(min(sector.complete, self._log.angle[-1]), final=False))
+        rows = self._run(min(sector.complete, float(self._log.angle[-1])), final=False)
+        return sector.adding(tracks=rows) if len(rows) else sector
 
     def adopt(self, tracks: Table) -> None:
         """Go on with tracks from elsewhere, as confirmed ones, from the last sector on.
@@ -186,50 +192,20 @@ class Tracker:
 
     def _take(self, sector: Sector) -> None:
         """Put a sector's centroids into the queue, in the order of their angles."""
-        table = sector.centroids
-        self.counts.centroids += len(table)
-        good = np.isfinite(table["range"]) & np.isfinite(table["azimuth"]) & np.isfinite(table["time"])
-        good &= table["range"] >= 0
-        self.counts.invalid += len(table) - int(good.sum())
-        plots = self._pending(table[good])
-        late = plots["phi"] < (self._next_bin_number - 1) * self._bin
-        self.counts.late += int(late.sum())
-        waiting, fresh = self._queue[self._world.size[N_QUEUE] :], plots[~late]
-        self._queue = np.empty(len(waiting) + len(fresh), PENDING)
-        self._queue[: len(waiting)], self._queue[len(waiting) :] = waiting, fresh
-        self._world.size[N_QUEUE] = 0
-        self._queue = self._queue[
-            np.lexsort((self._queue["ordinal"], self._queue["range"], self._queue["phi"]))
-        ]
-
-    def _pending(self, table: Table) -> Table:
-        """Centroids as positions in the site's plane."""
-        plots = np.zeros(len(table), PENDING)
-        angle, (east, north, up) = self._log.at_time(table["time"])
-        # The watermark bounds what a time can say: nothing below it is delivered any more.
+        table = np.ascontiguousarray(sector.centroids)
+        waiting = self._queue[self._world.size[N_QUEUE] :]
+        fresh = np.empty(len(table), PENDING)
         closed = (self._next_bin_number - 1) * self._bin
-        late = angle < closed - 0.5 * TURN  # so late that the nearest turn would be one ahead
-        angle = np.where(late, angle, np.clip(angle, closed, self._log.angle[-1]))
-        azimuth = table["azimuth"]
-        plots["phi"] = azimuth + TURN * np.ceil((angle - azimuth) / TURN - 0.5)
-        above_sea = up + (self.radar.site.height if self.radar.site else 0.0)
-        plots["range"] = ground_range(table["range"], table["height"], above_sea)
-        for name in ("sd_range", "sd_azimuth"):
-            claimed = table[name]
-            plots[name] = np.where(np.isfinite(claimed) & (claimed > 0), claimed, self._world.par[name])
-        z = from_polar(plots["range"], azimuth, plots["sd_range"], plots["sd_azimuth"])
-        plots["e"], plots["n"] = z.mean[:, 0] + east, z.mean[:, 1] + north
-        plots["ee"], plots["en"], plots["nn"] = z.cov[:, 0, 0], z.cov[:, 0, 1], z.cov[:, 1, 1]
-        plots["s_e"], plots["s_n"] = east, north
-        plots["up"], plots["uu"] = table["height"], _SD_HEIGHT**2
-        if self.settings.dimensions == 2:
-            plots["up"] = np.nan
-        plots["doppler"], plots["sd_doppler"] = table["doppler"], table["sd_doppler"]
-        plots["t"], plots["ordinal"] = table["time"], table["ordinal"]
-        plots["mode_3a"], plots["address"] = table["mode_3a"], table["address"]
-        plots["extended"] = table["flags"] & np.uint32(CentroidFlag.EXTENDED) != 0
-        plots["weight"] = 1.0
-        return plots
+        n, late = take(
+            table, *self._log.known, closed, self._above_sea, self.settings.dimensions == 3, self._world.par,
+            fresh,
+        )  # fmt: skip
+        self._counts.centroids += len(table)
+        self._counts.invalid += len(table) - n - late
+        self._counts.late += late
+        self._queue = np.empty(len(waiting) + n, PENDING)
+        merge(waiting, fresh[:n], self._queue)
+        self._world.size[N_QUEUE] = 0
 
     @property
     def _bin(self) -> float:
@@ -259,18 +235,19 @@ class Tracker:
             stop += 1  # the bin in which the stream ends
         if stop == first:
             return NO_TRACKS
-        beams = self._log.bins(np.arange(first - 1, stop) * width)
+        beams = self._log.bins(first - 1, stop - first, width)
         rows: list[Table] = []
-        done = 0
+        done, size = 0, self._world.size
         while done < len(beams):
-            done += self._sweep(beams[done:], final)
-            rows.append(self._world.rows[: self._world.size[N_ROWS]].copy())
-            self._world.size[N_ROWS] = 0
+            done += self._sweep(beams[done:] if done else beams, final)
+            if size[N_ROWS]:
+                rows.append(self._world.rows[: size[N_ROWS]].copy())
+                size[N_ROWS] = 0
             if done < len(beams):
                 self._world = _grown(self._world)
         self._next_bin = stop
-        for name, value in zip(SWEPT_COUNTS, self._world.tally.tolist(), strict=True):
-            setattr(self.counts, name, value)
+        if not rows:
+            return NO_TRACKS
         return rows[0] if len(rows) == 1 else np.concatenate(rows)
 
     def _sweep(self, beams: Any, final: bool) -> int:
@@ -335,21 +312,15 @@ class _BeamLog:
         self._seen[n] = seen
         self._count = n + 1
 
-    def at_time(self, time: Array) -> tuple[Array, Array]:
-        """Angle (n,) of the beam and position (3, n) of the sensor."""
-        known = self._rows[:, : self._count]
-        angle, *position = (np.interp(time, known[0], row) for row in known[1:])
-        return angle, np.round(np.array(position) * _GRID) / _GRID
+    @property
+    def known(self) -> tuple[Array, int]:
+        """The edges (5, m), and how many of them are filled."""
+        return self._rows, self._count
 
-    def bins(self, edges: Array) -> Any:
-        """The bins between `edges` (n + 1,), as a BEAM table (n,)."""
-        t, angle, east, north, _ = self._rows[:, : self._count]
-        found = np.round(np.array([np.interp(edges, angle, row) for row in (t, east, north)]) * _GRID) / _GRID
-        beams = np.zeros(len(edges) - 1, BEAM)
-        beams["phi"], beams["t"], beams["step"] = edges[1:], found[0, 1:], np.diff(found[0])
-        beams["e"], beams["n"] = found[1:, 1:]
-        middle = np.searchsorted(angle, 0.5 * (edges[1:] + edges[:-1]))
-        beams["seen"] = self._seen[np.minimum(middle, self._count - 1)]
+    def bins(self, first: int, count: int, width: float) -> Any:
+        """The BEAM table (count,) of the bins from number `first` on."""
+        beams = np.empty(count, BEAM)
+        bins(self._rows, self._count, self._seen, first, width, beams)
         return beams
 
 
