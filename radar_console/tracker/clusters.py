@@ -34,21 +34,21 @@ _serve = management.serve
 _PRUNE = 1e-3  # of the miss: a pair that is less likely is no pair
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
 def group(beam: Any, w: World, final: bool) -> None:
     """Find the clusters that are due, and list their members and pairs."""
-    size, tracks, pool, edges = w.size, w.tracks, w.pool, w.edges
+    size, tracks, pool, edges = w.books.size, w.tracks, w.pool, w.edges
     n = size[N_OPEN]
     size[N_MEMBERS] = size[N_PAIRS] = 0
-    for p in range(size[N_POOL]):
-        pool[p].mark = -1
-    parent = np.arange(n)
     any_swept = False
     for place in range(n):
         track = tracks[w.opened[place]]
         any_swept |= track.level == CONFIRMED and track.swept
     if not any_swept:
         return
+    for p in range(size[N_POOL]):
+        pool[p].mark = -1
+    parent = np.arange(n)
     for k in range(size[N_EDGES]):
         edge = edges[k]
         if edge.spent or tracks[edge.track].level != CONFIRMED:
@@ -76,7 +76,7 @@ def group(beam: Any, w: World, final: bool) -> None:
         if head[root] < 0 or not (complete[root] or due[root]):
             continue
         if not complete[root]:
-            w.tally[C_FORCED] += 1
+            w.books.tally[C_FORCED] += 1
         place = head[root]
         while place >= 0:
             index = w.opened[place]
@@ -146,7 +146,7 @@ def evidence(track: Any, plot: Any, par: Any) -> float:
 @njit(cache=True, nogil=True, error_model="numpy")
 def associate(w: World) -> None:
     """Find the probability of every pair, cluster by cluster, and use the plots up."""
-    lo, stop = 0, w.size[N_MEMBERS]
+    lo, stop = 0, w.books.size[N_MEMBERS]
     while lo < stop:
         hi = lo + 1
         while hi < stop and w.members[hi].cluster == w.members[lo].cluster:
@@ -159,7 +159,7 @@ def associate(w: World) -> None:
 def _associate(lo: int, hi: int, w: World) -> None:
     tracks, pool, par = w.tracks, w.pool, w.par
     begin = w.members[lo].pairs
-    end = w.members[hi].pairs if hi < w.size[N_MEMBERS] else w.size[N_PAIRS]
+    end = w.members[hi].pairs if hi < w.books.size[N_MEMBERS] else w.books.size[N_PAIRS]
     m, pairs = hi - lo, end - begin
     miss = np.full(m, 1.0 - par.p_d * par.p_g)
     row, col, weight = np.empty(pairs, np.int64), np.empty(pairs, np.int64), np.empty(pairs)
@@ -170,7 +170,7 @@ def _associate(lo: int, hi: int, w: World) -> None:
     for i in range(m):
         member = w.members[lo + i]
         track = tracks[member.track]
-        until = w.members[lo + i + 1].pairs if lo + i + 1 < w.size[N_MEMBERS] else w.size[N_PAIRS]
+        until = w.members[lo + i + 1].pairs if lo + i + 1 < w.books.size[N_MEMBERS] else w.books.size[N_PAIRS]
         for k in range(member.pairs, until):
             pair = w.pairs[k]
             plot = pool[pair.plot]
@@ -210,7 +210,7 @@ def _associate(lo: int, hi: int, w: World) -> None:
             track.score += math.log(total[i])
             w.members[lo + i].rough = rough[i]
             if rough[i]:
-                w.tally[C_APPROXIMATE] += 1
+                w.books.tally[C_APPROXIMATE] += 1
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -242,12 +242,13 @@ def step(w: World, lo: int, hi: int) -> None:
         _update_height(track, w.pool, chosen, beta, w.par.up_q)
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
 def serve_members(beam: Any, w: World) -> None:
     """Account for the pass of every swept member."""
-    for m in range(w.size[N_MEMBERS]):
+    for m in range(w.books.size[N_MEMBERS]):
         member = w.members[m]
-        if not w.tracks[member.track].swept:
+        track = w.tracks[member.track]
+        if not track.swept:
             continue
         best = -1
         for k in range(member.pairs, member.pairs + member.kept):
@@ -255,8 +256,7 @@ def serve_members(beam: Any, w: World) -> None:
                 best = k
         if best >= 0:
             pair = w.pairs[best]
-            _serve(
-                member.track, member.used >= 0.5, True, w.pool[pair.plot], pair.beta, member.rough, beam, w
-            )
+            _serve(track, member.track, member.used >= 0.5, True, w.pool[pair.plot], pair.beta, member.rough,
+                   beam, w.par, w.books)  # fmt: skip
         else:
-            _serve(member.track, False, False, w.pool[0], math.nan, member.rough, beam, w)
+            _serve(track, member.track, False, False, w.pool[0], math.nan, member.rough, beam, w.par, w.books)

@@ -47,7 +47,7 @@ def place(e: float, n: float, max_range: float) -> tuple[int, int]:
     return ring, column
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
 def turn_to(clutter: Any, phi: float) -> None:
     """Forget a part of each column that the beam enters on its way to the unwrapped angle `phi`."""
     now = math.floor(phi / (2.0 * math.pi) * COLUMNS)
@@ -65,7 +65,7 @@ def turn_to(clutter: Any, phi: float) -> None:
 @njit(cache=True, nogil=True, error_model="numpy")
 def survey(plot: Any, beam: Any, w: World) -> None:
     """Count what the beam met around a plot just before it; and keep the plot for those to come."""
-    par, past, size, clutter = w.par, w.past, w.size, w.clutter
+    par, past, size, clutter = w.par, w.past, w.books.size, w.clutter
     de, dn = plot.e - beam.e, plot.n - beam.n
     r = math.hypot(de, dn)
     rho = 0.5 * par.max_speed * par.turn + math.hypot(par.sd_range, r * par.sd_azimuth)
@@ -125,10 +125,10 @@ def gather(track: Any, plot: Any) -> None:
     track.exposure = TRACK_MEMORY * (track.exposure + plot.exposure)
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
 def forget(phi: float, w: World) -> None:
     """Drop what the counts need no more, once it is the better part of what is kept."""
-    drop, size = _first_from(w.past, w.size[N_PAST], phi - math.pi), w.size
+    drop, size = _first_from(w.past, w.books.size[N_PAST], phi - math.pi), w.books.size
     if drop < 256 or 2 * drop < size[N_PAST]:
         return
     left = size[N_PAST] - drop

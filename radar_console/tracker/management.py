@@ -26,6 +26,7 @@ from radar_console.tracker.records import (
     STARTER,
     TENTATIVE,
     Belief,
+    Books,
     World,
 )
 
@@ -49,10 +50,10 @@ def begin(plot: Any, dense: bool, w: World) -> None:
     The speeds fill a disc of radius `max_speed`, whose standard deviation is half of that in each
     axis; the second plot is taken in by the Kalman update, which makes it the two-point start.
     """
-    index = w.size[N_TRACKS]
+    index = w.books.size[N_TRACKS]
     track, par = w.tracks[index], w.par
-    w.size[N_TRACKS] += 1
-    w.wake[index] = -math.inf
+    w.books.size[N_TRACKS] += 1
+    w.books.wake[index] = -math.inf
     track.id, track.born, track.t = plot.ordinal, plot.t, plot.t
     x, P = track.x, track.P
     x[0], x[1], x[2], x[3] = plot.e, plot.n, 0.0, 0.0
@@ -75,37 +76,36 @@ def begin(plot: Any, dense: bool, w: World) -> None:
     _begin_height(track, plot)
     track.dense, track.voiced = dense, True
     track.swept = track.served = track.dead = track.claims = track.proven = False
-    report(track, _TENTATIVE, True, True, plot, 1.0, False, plot.t, w)
+    report(track, _TENTATIVE, True, True, plot, 1.0, False, plot.t, par, w.books)
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def kill(index: int, w: World) -> None:
+def kill(track: Any, index: int, books: Books) -> None:
     """Have the track buried at the end of the bin."""
-    track = w.tracks[index]
     if not track.dead:
         track.dead = track.served = True
-        w.dead[w.size[N_DEAD]] = index
-        w.size[N_DEAD] += 1
+        books.dead[books.size[N_DEAD]] = index
+        books.size[N_DEAD] += 1
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def serve(
-    index: int, hit: bool, seen: bool, plot: Any, probability: float, rough: bool, beam: Any, w: World
-) -> None:
+    track: Any, index: int, hit: bool, seen: bool, plot: Any, probability: float, rough: bool, beam: Any,
+    par: Any, books: Books,
+) -> None:  # fmt: skip
     """Account for one pass of the beam over a track.
 
     `seen`: there was a plot in the gate, and the state is at its time; otherwise the state is left
     as it was. A pass over a blanked sector without a plot is no miss: the radar did not look.
     """
-    track, par = w.tracks[index], w.par
     t_pass = track.t if seen else max(beam.t - max(track.rho, 0.0) / par.bin * beam.step, track.t)
     e, n, _, _, _ = _predicted(track, t_pass - track.t)
     crossed = beam.phi - track.rho
     track.psi += _TURN + _wrap(math.atan2(e - beam.e, n - beam.n) - track.psi)
     track.served, track.claims = True, False
-    w.wake[index] = -math.inf
-    if not seen and w.blank[math.floor(crossed / par.bin) % w.blank.size]:
-        w.tally[C_BLANKED] += 1
+    books.wake[index] = -math.inf
+    if not seen and books.blank[math.floor(crossed / par.bin) % books.blank.size]:
+        books.tally[C_BLANKED] += 1
         return
     track.passes += 1
     if seen:
@@ -119,40 +119,42 @@ def serve(
         track.hits += 1
         track.previous, track.last = track.last, plot.ordinal
         _learn(track, plot)
-    status = _keep(index, hit, w) if track.level == CONFIRMED else _judge(index, hit, w)
+    status = (
+        _keep(track, index, hit, par, books)
+        if track.level == CONFIRMED
+        else _judge(track, index, hit, par, books)
+    )
     track.probability = probability
     if track.voiced and not track.proven:
-        report(track, status, hit, seen, plot, probability, rough, t_pass, w)
+        report(track, status, hit, seen, plot, probability, rough, t_pass, par, books)
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _keep(index: int, hit: bool, w: World) -> int:
+def _keep(track: Any, index: int, hit: bool, par: Any, books: Books) -> int:
     """Coast or delete a confirmed track; its status after this pass.
 
     Its score is held below what `delete_misses` misses in a row take away, so that they delete it,
     and so does evidence that says less and less for the target: in dense clutter there is always
     some plot in the gate.
     """
-    track, par = w.tracks[index], w.par
     enough = _FIRST_SCORE - (par.delete_misses + 0.5) * math.log(max(1.0 - par.p_d * par.p_g, 1e-3))
     track.score = min(track.score, max(enough, par.confirm_score))
     if track.misses >= par.delete_misses or track.score < _FIRST_SCORE:
-        kill(index, w)
-        w.tally[C_LOST] += 1
+        kill(track, index, books)
+        books.tally[C_LOST] += 1
         return _DELETED
     return _CONFIRMED if hit else _COASTING
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _judge(index: int, hit: bool, w: World) -> int:
+def _judge(track: Any, index: int, hit: bool, par: Any, books: Books) -> int:
     """Find a young track proven, or delete it; its status after this pass."""
-    track, par = w.tracks[index], w.par
     track.peak = max(track.peak, track.score)
     fast = _too_fast(track, par)
     track.proven = track.level == TENTATIVE and hit and not fast and _proven(track, par)
     if not track.proven and (fast or _hopeless(track, par)):
-        kill(index, w)
-        w.tally[C_DELETED] += track.voiced
+        kill(track, index, books)
+        books.tally[C_DELETED] += track.voiced
         return _DELETED
     return _TENTATIVE
 
@@ -160,7 +162,7 @@ def _judge(index: int, hit: bool, w: World) -> int:
 @njit(cache=True, nogil=True, error_model="numpy")
 def confirm(index: int, plot: Any, beam: Any, w: World) -> None:
     """Promote a proven track, whose last plot is `plot`."""
-    track, size = w.tracks[index], w.size
+    track, size = w.tracks[index], w.books.size
     if not track.voiced:
         # The number of its first plot is another branch's; no track starts from this plot.
         track.id, track.voiced = plot.ordinal, True
@@ -168,9 +170,9 @@ def confirm(index: int, plot: Any, beam: Any, w: World) -> None:
     track.level, track.slot = CONFIRMED, size[N_SLOTS]
     w.belief.owner[track.slot] = index
     size[N_SLOTS] += 1
-    report(track, _CONFIRMED, True, True, plot, track.probability, False, track.t, w)
+    report(track, _CONFIRMED, True, True, plot, track.probability, False, track.t, w.par, w.books)
     _start_belief(track, beam.e, beam.n, w.par, w.belief)
-    w.tally[C_CONFIRMED] += 1
+    w.books.tally[C_CONFIRMED] += 1
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -179,11 +181,11 @@ def adopt(index: int, sensor_e: float, sensor_n: float, w: World) -> None:
     track, par = w.tracks[index], w.par
     track.curve[0] = track.curve[1] = track.growth[1] = 0.0
     track.growth[0] = track.growth[2] = par.q / 3.0
-    track.level, track.slot = CONFIRMED, w.size[N_SLOTS]
+    track.level, track.slot = CONFIRMED, w.books.size[N_SLOTS]
     w.belief.owner[track.slot] = index
-    w.wake[index] = -math.inf
-    w.size[N_SLOTS] += 1
-    w.size[N_TRACKS] += 1
+    w.books.wake[index] = -math.inf
+    w.books.size[N_SLOTS] += 1
+    w.books.size[N_TRACKS] += 1
     _start_belief(track, sensor_e, sensor_n, par, w.belief)
 
 
@@ -227,19 +229,12 @@ def _hopeless(track: Any, par: Any) -> bool:
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def report(
-    track: Any,
-    status: int,
-    hit: bool,
-    seen: bool,
-    plot: Any,
-    probability: float,
-    rough: bool,
-    t: float,
-    w: World,
-) -> None:
+    track: Any, status: int, hit: bool, seen: bool, plot: Any, probability: float, rough: bool, t: float,
+    par: Any, books: Books,
+) -> None:  # fmt: skip
     """Write a row of the TRACK table; a track whose pass saw nothing is predicted to the pass."""
-    row = w.rows[w.size[N_ROWS]]
-    w.size[N_ROWS] += 1
+    row = books.rows[books.size[N_ROWS]]
+    books.size[N_ROWS] += 1
     x, P, T = track.x, track.P, max(t - track.t, 0.0)
     e, n, ee, _, nn = _predicted(track, T)
     row.track, row.time, row.status, row.hit = track.id, t, status, hit
@@ -248,7 +243,7 @@ def report(
     row.sd_east, row.sd_north = math.sqrt(max(ee, 0.0)), math.sqrt(max(nn, 0.0))
     row.sd_v_east = math.sqrt(max(P[2, 2] + 3.0 * T * track.growth[0], 0.0))
     row.sd_v_north = math.sqrt(max(P[3, 3] + 3.0 * T * track.growth[2], 0.0))
-    up, v_up, pp, _, vv = _height(track, t, w.par.up_q)
+    up, v_up, pp, _, vv = _height(track, t, par.up_q)
     row.up, row.v_up = up, v_up
     known = math.isfinite(up)
     row.sd_up, row.sd_v_up = math.sqrt(pp) if known else np.nan, math.sqrt(vv) if known else np.nan
@@ -258,11 +253,11 @@ def report(
     row.born, row.approximate, row.mode_3a = track.born, rough, track.mode_3a
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
 def bury(w: World) -> None:
     """Take the dead out; the last tracks move into the holes, and so does what they believe."""
-    size, tracks, belief = w.size, w.tracks, w.belief
-    dead = w.dead[: size[N_DEAD]]
+    size, tracks, belief = w.books.size, w.tracks, w.belief
+    dead = w.books.dead[: size[N_DEAD]]
     if dead.size == 0:
         return
     for index in dead:
@@ -283,7 +278,7 @@ def bury(w: World) -> None:
         while tracks[mover].dead:
             mover -= 1
         tracks[index] = tracks[mover]
-        w.wake[index] = w.wake[mover]
+        w.books.wake[index] = w.books.wake[mover]
         if tracks[index].slot >= 0:
             belief.owner[tracks[index].slot] = index
         moved[mover - left] = index

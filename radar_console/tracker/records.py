@@ -233,15 +233,25 @@ N_TRACKS, N_POOL, N_EDGES, N_SLOTS, N_ROWS, N_QUEUE, N_OPEN, N_MEMBERS, N_PAIRS,
 SIZES = 12
 
 
+class Books(NamedTuple):
+    """What the accounting of a pass writes; handed on by itself, since it is small."""
+
+    rows: Any  # TRACK table
+    wake: NDArray[np.float64]  # (tracks, 2) beam angle and time before which a gate can't be reached
+    dead: NDArray[np.int64]  # (tracks,) the rows to be buried at the bin's end
+    blank: NDArray[np.bool_]  # (bins,) the radar did not look
+    size: NDArray[np.int64]  # (SIZES,)
+    tally: NDArray[np.int64]  # (counts,)
+
+
 class World(NamedTuple):
     """Everything that the compiled sweep works on."""
 
     par: Any  # PARAMETERS record
     clutter: Any  # `clutter.MAP` record
     tracks: Any  # STATE table
-    wake: NDArray[np.float64]  # (tracks, 2) beam angle and time before which a gate can't be reached
+    books: Books
     opened: NDArray[np.int64]  # (tracks,) the rows whose gates the beam has reached
-    dead: NDArray[np.int64]  # (tracks,) the rows to be buried at the bin's end
     pool: Any  # PENDING table
     past: Any  # PAST table
     edges: Any  # EDGE table
@@ -249,8 +259,4 @@ class World(NamedTuple):
     pairs: Any  # PAIR table
     relative: NDArray[np.float32]  # (pairs, N) what `filters.log_likelihood` gave
     belief: Belief
-    blank: NDArray[np.bool_]  # (bins,) the radar did not look
-    rows: Any  # TRACK table
-    size: NDArray[np.int64]  # (SIZES,)
     need: NDArray[np.int64]  # (SIZES,) of the bin that did not fit
-    tally: NDArray[np.int64]  # (counts,)

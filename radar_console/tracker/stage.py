@@ -46,6 +46,7 @@ from radar_console.tracker.records import (
     STATE,
     SWEPT_COUNTS,
     Belief,
+    Books,
     World,
 )
 from radar_console.tracker.sweep import close_bin, open_bin, sweep
@@ -114,7 +115,7 @@ class Tracker:
     @property
     def counts(self) -> Counts:
         """What has been done so far."""
-        for name, value in zip(SWEPT_COUNTS, self._world.tally.tolist(), strict=True):
+        for name, value in zip(SWEPT_COUNTS, self._world.books.tally.tolist(), strict=True):
             setattr(self._counts, name, value)
         return self._counts
 
@@ -157,11 +158,11 @@ class Tracker:
         if self._last is None:
             raise ValueError("expected a sector before tracks are adopted")
         need = self._world.need
-        need[:] = self._world.size
+        need[:] = self._world.books.size
         need[N_TRACKS] += len(tracks)
         need[N_SLOTS] += len(tracks)
         self._world = _grown(self._world)
-        world, first = self._world, int(self._world.size[N_TRACKS])
+        world, first = self._world, int(self._world.books.size[N_TRACKS])
         rows = world.tracks[first : first + len(tracks)]
         rows[:] = np.zeros(1, STATE)
         rows["id"], rows["born"], rows["t"] = tracks["track"], tracks["born"], tracks["time"]
@@ -193,7 +194,7 @@ class Tracker:
     def _take(self, sector: Sector) -> None:
         """Put a sector's centroids into the queue, in the order of their angles."""
         table = np.ascontiguousarray(sector.centroids)
-        waiting = self._queue[self._world.size[N_QUEUE] :]
+        waiting = self._queue[self._world.books.size[N_QUEUE] :]
         fresh = np.empty(len(table), PENDING)
         closed = (self._next_bin_number - 1) * self._bin
         n, late = take(
@@ -205,7 +206,7 @@ class Tracker:
         self._counts.late += late
         self._queue = np.empty(len(waiting) + n, PENDING)
         merge(waiting, fresh[:n], self._queue)
-        self._world.size[N_QUEUE] = 0
+        self._world.books.size[N_QUEUE] = 0
 
     @property
     def _bin(self) -> float:
@@ -222,7 +223,7 @@ class Tracker:
         turns = math.floor(gap / TURN)
         if turns >= _FEW_TURNS:
             self._world.tracks["psi"] += turns * TURN
-            self._world.wake[:] = -np.inf
+            self._world.books.wake[:] = -np.inf
             self._next_bin = self._next_bin_number + turns * self.settings.bins
 
     def _run(self, complete: float, final: bool) -> Table:
@@ -237,11 +238,11 @@ class Tracker:
             return NO_TRACKS
         beams = self._log.bins(first - 1, stop - first, width)
         rows: list[Table] = []
-        done, size = 0, self._world.size
+        done, size = 0, self._world.books.size
         while done < len(beams):
             done += self._sweep(beams[done:] if done else beams, final)
             if size[N_ROWS]:
-                rows.append(self._world.rows[: size[N_ROWS]].copy())
+                rows.append(self._world.books.rows[: size[N_ROWS]].copy())
                 size[N_ROWS] = 0
             if done < len(beams):
                 self._world = _grown(self._world)
@@ -252,7 +253,7 @@ class Tracker:
 
     def _sweep(self, beams: Any, final: bool) -> int:
         """Process bins until one needs larger tables; the number of bins that are done."""
-        if self._threads == 1 or self._world.size[N_SLOTS] < _MANY_TRACKS:
+        if self._threads == 1 or self._world.books.size[N_SLOTS] < _MANY_TRACKS:
             return int(sweep(beams, self._queue, self._world, final))
         if self._pool is None:
             self._pool = ThreadPoolExecutor(self._threads - 1, "tracker")
@@ -260,7 +261,7 @@ class Tracker:
         for b in range(len(beams)):
             if not open_bin(beams[b], self._queue, world, final):
                 return b
-            if world.size[N_MEMBERS]:
+            if world.books.size[N_MEMBERS]:
                 self._share(weigh)
                 associate(world)
                 self._share(step)
@@ -270,7 +271,7 @@ class Tracker:
     def _share(self, work: Callable[[World, int, int], None]) -> None:
         """Do the work of all members, a slice in each thread."""
         assert self._pool is not None
-        members = int(self._world.size[N_MEMBERS])
+        members = int(self._world.books.size[N_MEMBERS])
         parts = min(self._threads, max(members // _LEAST_SHARE, 1))
         edges = [members * k // parts for k in range(parts + 1)]
         others = [self._pool.submit(work, self._world, lo, hi) for lo, hi in pairwise(edges[1:])]
@@ -413,9 +414,15 @@ def _empty_world(settings: TrackerSettings, radar: Radar, seed: int) -> World:
         par=par,
         clutter=clutter.empty_map()[0],
         tracks=np.zeros(64, STATE),
-        wake=np.zeros((64, 2)),
+        books=Books(
+            rows=np.zeros(256, TRACK),
+            wake=np.zeros((64, 2)),
+            dead=np.zeros(64, np.int64),
+            blank=np.zeros(settings.bins, np.bool_),
+            size=np.zeros(SIZES, np.int64),
+            tally=np.zeros(len(SWEPT_COUNTS), np.int64),
+        ),
         opened=np.zeros(64, np.int64),
-        dead=np.zeros(64, np.int64),
         pool=np.zeros(64, PENDING),
         past=np.zeros(256, PAST),
         edges=np.zeros(256, EDGE),
@@ -423,27 +430,21 @@ def _empty_world(settings: TrackerSettings, radar: Radar, seed: int) -> World:
         pairs=np.zeros(64, PAIR),
         relative=np.zeros((64, count), np.float32),
         belief=belief,
-        blank=np.zeros(settings.bins, np.bool_),
-        rows=np.zeros(256, TRACK),
-        size=np.zeros(SIZES, np.int64),
         need=np.zeros(SIZES, np.int64),
-        tally=np.zeros(len(SWEPT_COUNTS), np.int64),
     )
 
 
 _ROOM = {
     "tracks": N_TRACKS,
-    "wake": N_TRACKS,
     "opened": N_TRACKS,
-    "dead": N_TRACKS,
     "pool": N_POOL,
     "past": N_PAST,
     "edges": N_EDGES,
     "members": N_MEMBERS,
     "pairs": N_PAIRS,
     "relative": N_PAIRS,
-    "rows": N_ROWS,
 }
+_BOOK_ROOM = {"rows": N_ROWS, "wake": N_TRACKS, "dead": N_TRACKS}
 
 
 def _grown(world: World) -> World:
@@ -451,7 +452,8 @@ def _grown(world: World) -> World:
     need, belief = world.need, world.belief
     slots = {name: _longer(getattr(belief, name), need[N_SLOTS]) for name in Belief._fields[:-1]}
     tables = {name: _longer(getattr(world, name), need[place]) for name, place in _ROOM.items()}
-    return world._replace(belief=belief._replace(**slots), **tables)
+    books = {name: _longer(getattr(world.books, name), need[place]) for name, place in _BOOK_ROOM.items()}
+    return world._replace(belief=belief._replace(**slots), books=world.books._replace(**books), **tables)
 
 
 def _longer(table: Any, count: int) -> Any:

@@ -51,7 +51,7 @@ def sweep(beams: Any, queue: Any, w: World, final: bool) -> int:
     for b in range(beams.size):
         if not open_bin(beams[b], queue, w, final):
             return b
-        members = w.size[N_MEMBERS]
+        members = w.books.size[N_MEMBERS]
         if members:
             _weigh(w, 0, members)
             _associate(w)
@@ -63,14 +63,14 @@ def sweep(beams: Any, queue: Any, w: World, final: bool) -> int:
 @njit(cache=True, nogil=True, error_model="numpy")
 def open_bin(beam: Any, queue: Any, w: World, final: bool) -> bool:
     """Gate the bin's plots, and find the clusters to associate; False if there is no room for them."""
-    size, need = w.size, w.need
+    size, need = w.books.size, w.need
     need[:] = size
     if size[N_PHASE] != _OPENED:
         _find_open(beam, w)
         if not _gate(beam, queue, w):
             return False
         cell = math.floor(beam.phi / w.par.bin - 0.5)
-        w.blank[cell % w.blank.size] = not beam.seen
+        w.books.blank[cell % w.books.blank.size] = not beam.seen
         _link(w)
         _group(beam, w, final)
         size[N_PHASE] = _OPENED
@@ -84,7 +84,7 @@ def close_bin(beam: Any, w: World, final: bool) -> None:
     _serve_members(beam, w)
     _settle_young(beam, w, final)
     _retire(beam, w)
-    for place in range(w.size[N_OPEN]):
+    for place in range(w.books.size[N_OPEN]):
         track = w.tracks[w.opened[place]]
         if track.served:
             track.served = track.swept = False
@@ -92,32 +92,32 @@ def close_bin(beam: Any, w: World, final: bool) -> None:
     _bury(w)
     _turn_to(w.clutter, beam.phi)
     _forget(beam.phi, w)
-    w.size[N_PHASE] = 0
+    w.books.size[N_PHASE] = 0
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
 def _find_open(beam: Any, w: World) -> None:
     """List the tracks whose gates the beam has reached and that were not served since."""
     n = 0
-    for i in range(w.size[N_TRACKS]):
-        if beam.phi < w.wake[i, 0] and beam.t < w.wake[i, 1]:
+    for i in range(w.books.size[N_TRACKS]):
+        if beam.phi < w.books.wake[i, 0] and beam.t < w.books.wake[i, 1]:
             continue
         track = w.tracks[i]
-        _look(track, w.wake[i], beam, w.par)
+        _look(track, w.books.wake[i], beam, w.par)
         if track.claims or track.rho >= -track.half_width - _MARGIN:
             track.place, track.first = n, -1
             w.opened[n] = i
             n += 1
-    w.size[N_OPEN] = n
+    w.books.size[N_OPEN] = n
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
 def _gate(beam: Any, queue: Any, w: World) -> bool:
     """Take the bin's plots from the queue, and join each to the tracks in whose gates it is.
 
     The plots of a bin are close in angle; in range, each track finds its own by bisection.
     """
-    size, need, par, edges = w.size, w.need, w.par, w.edges
+    size, need, par, edges = w.books.size, w.need, w.par, w.edges
     stop = size[N_QUEUE]
     while stop < queue.size and queue[stop].phi < beam.phi:
         stop += 1
@@ -166,7 +166,7 @@ def _gate(beam: Any, queue: Any, w: World) -> bool:
         or need[N_PAST] > w.past.size
         or need[N_POOL] > w.pool.size
         or need[N_TRACKS] > w.tracks.size
-        or need[N_ROWS] > w.rows.size
+        or need[N_ROWS] > w.books.rows.size
         or need[N_SLOTS] > w.belief.owner.size
         or need[N_MEMBERS] > w.members.size
     ):
@@ -187,10 +187,10 @@ def _purged(tracks: int, par: Any) -> int:
     return tracks if tracks > par.max_tracks else 0
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
 def _link(w: World) -> None:
     """Chain each track's edges, in the order in which they came."""
-    for k in range(w.size[N_EDGES] - 1, -1, -1):
+    for k in range(w.books.size[N_EDGES] - 1, -1, -1):
         edge = w.edges[k]
         if not edge.spent:
             track = w.tracks[edge.track]

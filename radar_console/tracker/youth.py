@@ -44,15 +44,15 @@ _confirm = management.confirm
 _DELETED = int(TrackStatus.DELETED)
 _PRUNE = 1e-3  # of the miss: a pair that is less likely is no pair
 _NOBODY, _HELD = -2, -3  # marks of a plot: no track waits for it; some do
-_DENSE = 1.0  # false plots in the gate of a track's second plot, from which on clutter counts as dense
+_DENSE = 0.3  # false plots in the gate of a track's second plot, from which on clutter counts as dense
 _MOST_ENDS = 8  # branches that may end on one plot
 _PURGE = 0.95  # of the capacity is left when it was exceeded
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
 def settle(beam: Any, w: World, final: bool) -> None:
     """Serve the young tracks that the beam has passed, once no open confirmed track claims their plots."""
-    size, tracks, pool, edges = w.size, w.tracks, w.pool, w.edges
+    size, tracks, pool, edges = w.books.size, w.tracks, w.pool, w.edges
     for p in range(size[N_POOL]):
         pool[p].awaited = False
     for k in range(size[N_EDGES]):
@@ -78,7 +78,7 @@ def settle(beam: Any, w: World, final: bool) -> None:
                 _settle_starter(index, beam, w)
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
 def _settle_tentative(index: int, beam: Any, w: World) -> None:
     """Probabilistic data association of one track by itself."""
     track, pool, edges, par = w.tracks[index], w.pool, w.edges, w.par
@@ -89,7 +89,7 @@ def _settle_tentative(index: int, beam: Any, w: World) -> None:
     miss = 1.0 - par.p_d * par.p_g
     if count == 0:
         track.score += math.log(max(miss, 1e-300))
-        _serve(index, False, False, pool[0], math.nan, False, beam, w)
+        _serve(track, index, False, False, pool[0], math.nan, False, beam, par, w.books)
         return
     beta, chosen = np.empty(count), np.empty(count, np.int64)
     n, total, best, k = 0, miss, -1, track.first
@@ -108,14 +108,14 @@ def _settle_tentative(index: int, beam: Any, w: World) -> None:
         k = edges[k].next
     track.score += math.log(max(total, 1e-300))
     if best < 0:
-        _serve(index, False, False, pool[0], math.nan, False, beam, w)
+        _serve(track, index, False, False, pool[0], math.nan, False, beam, par, w.books)
         return
     used = 0.0
     for j in range(n):
         beta[j] /= total
         used += beta[j]
     _update_tentative(track, beta[:n], chosen[:n], pool, par)
-    _serve(index, used >= 0.5, True, pool[chosen[best]], beta[best], False, beam, w)
+    _serve(track, index, used >= 0.5, True, pool[chosen[best]], beta[best], False, beam, par, w.books)
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -147,7 +147,7 @@ def _update_tentative(track: Any, beta: Any, chosen: Any, pool: Any, par: Any) -
     _update_height(track, pool, chosen, beta, par.up_q)
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
 def _settle_starter(index: int, beam: Any, w: World) -> None:
     """Branch: each plot in the gate makes a pair; the likeliest one is reported on.
 
@@ -179,10 +179,10 @@ def _settle_starter(index: int, beam: Any, w: World) -> None:
             k = edges[k].next
         track.voiced = False
         if _branches(track, par):
-            _kill(index, w)
+            _kill(track, index, w.books)
             return
     track.score += math.log(max(miss, 1e-300))
-    _serve(index, False, False, pool[0], math.nan, False, beam, w)
+    _serve(track, index, False, False, pool[0], math.nan, False, beam, par, w.books)
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -193,22 +193,24 @@ def _branches(track: Any, par: Any) -> bool:
 @njit(cache=True, nogil=True, error_model="numpy")
 def _branch(index: int, k: int, weight: float, voiced: bool, beam: Any, w: World) -> None:
     """A tentative track from a starter and the plot of edge `k`, with likelihood ratio `weight`."""
-    child = w.size[N_TRACKS]
-    w.size[N_TRACKS] += 1
+    child = w.books.size[N_TRACKS]
+    w.books.size[N_TRACKS] += 1
     w.tracks[child] = w.tracks[index]
     track, chosen = w.tracks[child], w.edges[k].plot
     track.level, track.voiced, track.first, track.claims = TENTATIVE, voiced, -1, False
     track.score += math.log(weight)
     track.peak = track.score
     _update_tentative(track, np.ones(1), np.full(1, chosen), w.pool, w.par)
-    _serve(child, True, True, w.pool[chosen], 1.0, False, beam, w)
+    _serve(track, child, True, True, w.pool[chosen], 1.0, False, beam, w.par, w.books)
     track.served = track.swept = False
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
 def retire(beam: Any, w: World) -> None:
     """Let go the plots that no track waits for: merge the tracks that end there, and start new ones."""
-    size, tracks, pool, edges = w.size, w.tracks, w.pool, w.edges
+    size, tracks, pool, edges = w.books.size, w.tracks, w.pool, w.edges
+    if size[N_POOL] == 0:
+        return
     for p in range(size[N_POOL]):
         pool[p].mark, pool[p].head = _NOBODY, -1
     for k in range(size[N_EDGES] - 1, -1, -1):
@@ -296,9 +298,9 @@ def _keep_best(ends: Any, w: World) -> None:
     for k in np.argsort(score[:n], kind="mergesort")[_MOST_ENDS:]:
         track = w.tracks[index[k]]
         if track.voiced:
-            _report(track, _DELETED, False, False, w.pool[0], math.nan, False, track.t, w)
-            w.tally[C_MERGED] += 1
-        _kill(index[k], w)
+            _report(track, _DELETED, False, False, w.pool[0], math.nan, False, track.t, w.par, w.books)
+            w.books.tally[C_MERGED] += 1
+        _kill(track, index[k], w.books)
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -325,9 +327,9 @@ def _absorb(stays: int, ends: Any, same: bool, w: World) -> None:
         if index == stays or b.dead or b.level == CONFIRMED or (same and b.previous != a.previous):
             continue
         if b.voiced and b.id != heir:
-            _report(b, _DELETED, False, False, w.pool[0], math.nan, False, b.t, w)
-            w.tally[C_MERGED] += 1
-        _kill(index, w)
+            _report(b, _DELETED, False, False, w.pool[0], math.nan, False, b.t, w.par, w.books)
+            w.books.tally[C_MERGED] += 1
+        _kill(b, index, w.books)
     if heir >= 0:
         a.id, a.voiced = heir, True
 
@@ -336,20 +338,20 @@ def _absorb(stays: int, ends: Any, same: bool, w: World) -> None:
 def _start(plot: Any, free: bool, w: World) -> None:
     """Let a `free` plot that no confirmed track has used start a track."""
     if plot.extended:
-        w.tally[C_EXTENDED] += 1
+        w.books.tally[C_EXTENDED] += 1
         return
     par = w.par
     if free and plot.weight >= 0.5:
         reach = par.max_speed * par.turn
         crowd = _density_at(plot, 0.0, 0.0, par) * math.pi * reach * reach
         _begin(plot, crowd > _DENSE, w)
-        w.tally[C_STARTED] += 1
+        w.books.tally[C_STARTED] += 1
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
 def purge(w: World) -> None:
     """When there are more tracks than the capacity, the least likely young ones go."""
-    size, tracks = w.size, w.tracks
+    size, tracks = w.books.size, w.tracks
     if size[N_TRACKS] - size[N_DEAD] <= w.par.max_tracks:
         return
     score, index, n = np.empty(size[N_TRACKS]), np.empty(size[N_TRACKS], np.int64), 0
@@ -361,6 +363,6 @@ def purge(w: World) -> None:
     for k in np.argsort(score[:n], kind="mergesort")[:excess]:
         track = tracks[index[k]]
         if track.voiced:
-            _report(track, _DELETED, False, False, w.pool[0], math.nan, False, track.t, w)
-        _kill(index[k], w)
-        w.tally[C_CAPPED] += 1
+            _report(track, _DELETED, False, False, w.pool[0], math.nan, False, track.t, w.par, w.books)
+        _kill(track, index[k], w.books)
+        w.books.tally[C_CAPPED] += 1
