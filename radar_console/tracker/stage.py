@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from radar_console.core.messages import CENTROID, NO_TRACKS, TRACK, Radar, Sector, Table
+from radar_console.core.messages import CENTROID, NO_TRACKS, TRACK, Radar, Sector, Table, blank
 from radar_console.core.units import TURN
 from radar_console.estimation.gaussian import Array
 from radar_console.estimation.particle import normals
@@ -110,6 +110,7 @@ class Tracker:
         self._next_bin: int | None = None
         self._last: Sector | None = None
         self._threads = min(os.cpu_count() or 1, _MOST_THREADS) if threads is None else threads
+        self._many_tracks = _MANY_TRACKS
         self._pool: ThreadPoolExecutor | None = None
 
     @property
@@ -253,7 +254,7 @@ class Tracker:
 
     def _sweep(self, beams: Any, final: bool) -> int:
         """Process bins until one needs larger tables; the number of bins that are done."""
-        if self._threads == 1 or self._world.books.size[N_SLOTS] < _MANY_TRACKS:
+        if self._threads == 1 or self._world.books.size[N_SLOTS] < self._many_tracks:
             return int(sweep(beams, self._queue, self._world, final))
         if self._pool is None:
             self._pool = ThreadPoolExecutor(self._threads - 1, "tracker")
@@ -328,15 +329,29 @@ class _BeamLog:
 def warm_up() -> None:
     """Compile all kernels, or load them from their cache, by tracking two targets for a moment."""
     radar = Radar("", 4.0, 1000.0, 1.0, 0.01)
-    tracker = Tracker(TrackerSettings(particles=10), radar, 0)
-    for turn in range(8):
-        centroids = np.zeros(2, CENTROID)
-        centroids["ordinal"] = 2 * turn, 2 * turn + 1
-        centroids["time"], centroids["azimuth"] = 4.0 * turn + 1.0, 0.5 * math.pi
-        centroids["range"], centroids["height"] = (500.0, 501.0), np.nan
-        tracker.push(Sector(radar, 4.0 * turn, 4.0 * turn + 4.0, TURN * turn, TURN * (turn + 1),
-                            TURN * (turn + 1), centroids=centroids))  # fmt: skip
-    tracker.flush()
+    for threads in (1, 2):
+        tracker = Tracker(TrackerSettings(particles=10), radar, 0, threads)
+        tracker._many_tracks = 0
+        for turn in range(8):
+            centroids = np.zeros(2, CENTROID)
+            centroids["ordinal"] = 2 * turn, 2 * turn + 1
+            centroids["time"], centroids["azimuth"] = 4.0 * turn + 1.0, 0.5 * math.pi
+            centroids["range"], centroids["height"] = (500.0, 501.0), np.nan
+            tracker.push(Sector(radar, 4.0 * turn, 4.0 * turn + 4.0, TURN * turn, TURN * (turn + 1),
+                                TURN * (turn + 1), centroids=centroids))  # fmt: skip
+            if turn == 0:
+                tracker.adopt(blank(TRACK, 0))
+                tracker.adopt(_somewhere())
+        tracker.flush()
+
+
+def _somewhere() -> Table:
+    """A confirmed track that nothing will be heard of again."""
+    table = np.zeros(1, TRACK)
+    table["track"], table["east"], table["north"] = -1, 300.0, 300.0
+    for name in ("sd_east", "sd_north", "sd_v_east", "sd_v_north"):
+        table[name] = 1.0
+    return table
 
 
 def _parameters(settings: TrackerSettings, radar: Radar, seed: int) -> NDArray[np.void]:
