@@ -20,7 +20,7 @@ RINGS, COLUMNS = 32, 64
 MEMORY = 0.9  # of the map, for a turn
 TRACK_MEMORY = 0.9  # of a track, for a pass
 # Counts that a prior is worth: of nothing, of the coverage, and of the cell.
-FIRST_PRIOR, CELL_PRIOR, TRACK_PRIOR = 0.3, 0.5, 2.0
+FIRST_PRIOR, CELL_PRIOR, TRACK_PRIOR = 0.3, 0.5, 6.0
 _LEAST_DENSITY = 1e-15  # m⁻²
 
 MAP = np.dtype(
@@ -116,6 +116,16 @@ def density_at(plot: Any, near: float, exposure: float, par: Any) -> float:
         return float(plot.base)
     density: float = (near + plot.near + TRACK_PRIOR) / (exposure + plot.exposure + TRACK_PRIOR / plot.base)
     return density
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def doubted(track: Any, plot: Any, par: Any) -> float:
+    """λ, m⁻² and turn, for a track that has yet to prove itself: no less than the mean of the cell.
+
+    At the edge of a patch half of what is counted lies outside, and a false track there would live
+    on clutter that looks half as dense as it is.
+    """
+    return max(density_at(plot, track.near, track.exposure, par), float(plot.base))
 
 
 @njit(cache=True, nogil=True, error_model="numpy")

@@ -38,6 +38,7 @@ FIRST_SCORE = math.log(0.1 / 0.9)  # one plot in ten is a new target's
 _FIRST_SCORE = FIRST_SCORE
 _DROP = 4.6  # of the score from its peak, after which a young track is given up: odds of 1 to 100
 _DENSER = math.log(10.0)  # what dense clutter adds to the score that confirms
+_DOUBT = 0.1  # and more for each pass: what an error of the density by a tenth adds to a false score
 _LEAST_HITS = 3
 _TENTATIVE, _CONFIRMED = int(TrackStatus.TENTATIVE), int(TrackStatus.CONFIRMED)
 _COASTING, _DELETED = int(TrackStatus.COASTING), int(TrackStatus.DELETED)
@@ -215,7 +216,8 @@ def _proven(track: Any, par: Any) -> bool:
     if par.initiation == SCORE:
         return bool(scored and track.hits >= _LEAST_HITS)
     if by_score(track, par):
-        return bool(track.score >= par.confirm_score + _DENSER and track.hits >= _LEAST_HITS)
+        enough = par.confirm_score + _DENSER + _DOUBT * track.passes
+        return bool(track.score >= enough and track.hits >= _LEAST_HITS)
     return bool(counted and scored)
 
 

@@ -37,7 +37,7 @@ from radar_console.tracker.records import (
 
 _BROAD = particle.BROAD
 _density_of, _MARGIN = gating.density_of, gating.MARGIN
-_density_at = clutter.density_at
+_density_at, _doubted = clutter.density_at, clutter.doubted
 _evidence, _update_height = clusters.evidence, height.update
 _serve, _begin, _kill, _report = management.serve, management.begin, management.kill, management.report
 _confirm = management.confirm
@@ -97,7 +97,7 @@ def _settle_tentative(index: int, beam: Any, w: World) -> None:
         plot = pool[edges[k].plot]
         # A plot that a confirmed track still waits for is left to it.
         if plot.weight > 0.0 and not plot.awaited:
-            weight = par.p_d / _density_at(plot, track.near, track.exposure, par) * edges[k].density
+            weight = par.p_d / _doubted(track, plot, par) * edges[k].density
             weight *= plot.weight * _evidence(track, plot, par)
             if weight > _PRUNE * miss:
                 beta[n], chosen[n] = weight, edges[k].plot
@@ -160,7 +160,7 @@ def _settle_starter(index: int, beam: Any, w: World) -> None:
     while k >= 0:
         plot = pool[edges[k].plot]
         if plot.weight >= 0.5 and not plot.awaited:
-            weight = par.p_d / _density_at(plot, track.near, track.exposure, par) * edges[k].density
+            weight = par.p_d / _doubted(track, plot, par) * edges[k].density
             weight *= _evidence(track, plot, par)
             if weight > value:
                 best, value = k, weight
@@ -172,7 +172,7 @@ def _settle_starter(index: int, beam: Any, w: World) -> None:
         while k >= 0:
             plot = pool[edges[k].plot]
             if k != best and plot.weight >= 0.5 and not plot.awaited:
-                weight = par.p_d / _density_at(plot, track.near, track.exposure, par) * edges[k].density
+                weight = par.p_d / _doubted(track, plot, par) * edges[k].density
                 weight *= _evidence(track, plot, par)
                 if weight > _PRUNE * miss:
                     _branch(index, k, weight, False, beam, w)
