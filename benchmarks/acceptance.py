@@ -2,14 +2,15 @@
 
 Examples:
   python benchmarks/acceptance.py scenario twenty-five --first 25 --seeds 10
-  python benchmarks/acceptance.py codes flight.pcap
+  python benchmarks/acceptance.py codes flight.pcap --identity ignore
   python benchmarks/acceptance.py positions boats.csv truth.csv --config boats.toml
 """
 
 import csv
 from collections import Counter, defaultdict
+from dataclasses import replace
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Literal
 
 import numpy as np
 import typer
@@ -23,6 +24,7 @@ app = typer.Typer(
     add_completion=False, rich_markup_mode="rich", help="Figures of whole runs, scored against the truth."
 )
 
+Identity = Literal["use", "ignore"]
 NEAR = 2000.0  # m; a confirmed track within it of a target is that target's
 HELD = (TrackStatus.CONFIRMED, TrackStatus.COASTING)
 
@@ -93,17 +95,25 @@ def score_targets(held: Table, opened: Opened, near: float) -> str:
     )
 
 
+def with_identity(opened: Opened, identity: Identity) -> Opened:
+    """The same source, its codes and addresses evidence to the tracker or not."""
+    tracker = opened.settings.tracker.model_copy(update={"identity": identity})
+    return replace(opened, settings=opened.settings.model_copy(update={"tracker": tracker}))
+
+
 @app.command(epilog="Example:  python benchmarks/acceptance.py codes flight.pcap")
 def codes(
     recording: Path,
     config: Annotated[Path | None, typer.Option()] = None,
     least: Annotated[int, typer.Option(help="Reports that a code needs to count.")] = 20,
+    identity: Annotated[
+        Identity | None, typer.Option(help="In place of the setting: does the tracker see the codes?")
+    ] = None,
 ) -> None:
-    """How many Mode 3/A codes one track holds for at least 90 % of their reports.
-
-    The codes are for scoring alone: the tracker does not see them.
-    """
+    """How many Mode 3/A codes one track holds for at least 90 % of their reports."""
     opened = open_source(str(recording), config)
+    if identity is not None:
+        opened = with_identity(opened, identity)
     code_of: dict[int, int] = {}
     chain = Chain(opened)
     followers: defaultdict[int, Counter[int]] = defaultdict(Counter)
@@ -119,12 +129,14 @@ def codes(
     reports = Counter(code_of.values())
     counted = sorted(code for code, n in reports.items() if n >= least and code >= 0)
     held = 0
-    print("code  reports  by one track  tracks")
+    confirmed = chain.tally.confirmed
+    print("code  reports  by one track  tracks  confirmed")
     for code in counted:
         best = max(followers[code].values(), default=0)
+        sure = len(confirmed & set(followers[code]))
         share = best / reports[code]
         held += share >= 0.9
-        print(f"{code:04o}  {reports[code]:7}  {share:12.3f}  {len(followers[code]):6}")
+        print(f"{code:04o}  {reports[code]:7}  {share:12.3f}  {len(followers[code]):6}  {sure:9}")
     print(f"{held} of {len(counted)} codes held by one track for at least 90 % of their reports")
     print(figures_of(chain, 0.0))
 
