@@ -65,8 +65,12 @@ _LEAST_SHARE = 4  # members for each thread
 _CLIMB_NOISE = 1.0  # m²/s³, of the rate of climb
 _GRID = 2.0**20  # per s and per m: interpolated values are rounded, so that no cut shows in them
 _SD_HEIGHT = 30.0  # m, of a reported height
+_FARTHEST = 1e8  # m: no radar's range
+_OVERHEAD = 1e3  # m, beyond its range, that a target may be above the radar, by the errors of both
+_WIDEST = 1.0  # rad: an azimuth that is less certain says nothing
 _LOG = 2048  # sectors that are remembered, to find where the beam was
 _FEW_TURNS = 4
+_HUGE = 1e12  # s, rad and m: no sector's
 
 
 @dataclass(slots=True)
@@ -74,7 +78,8 @@ class Counts:
     """What the tracker did, and what it had to leave."""
 
     centroids: int = 0
-    invalid: int = 0  # centroids with a range, azimuth or time that is no number
+    invalid: int = 0  # centroids with a range, azimuth or time that cannot be
+    claims: int = 0  # heights and deviations of centroids that cannot be, taken as not claimed
     late: int = 0  # centroids below the watermark: their bin was closed
     extended: int = 0  # centroids that could not start a track: wider than a target
     started: int = 0
@@ -88,6 +93,7 @@ class Counts:
     capped: int = 0  # young tracks that went because there were too many
     clock_back: int = 0  # sectors whose time went back
     beam_back: int = 0  # sectors whose angle went back
+    broken: int = 0  # sectors whose time, angle or position cannot be: they are passed on as they are
 
 
 class Tracker:
@@ -123,6 +129,11 @@ class Tracker:
 
     def push(self, sector: Sector) -> Sector:
         """The sector, with a row for each track that was served by it, hit or missed."""
+        if not _sound(sector):
+            self.counts.broken += 1
+            self.counts.centroids += len(sector.centroids)
+            self.counts.invalid += len(sector.centroids)
+            return sector
         if sector.stop < sector.start or (self._last and sector.start < self._last.stop):
             self.counts.clock_back += 1
         if sector.end < sector.begin or (self._last and sector.end < self._last.end):
@@ -189,7 +200,7 @@ class Tracker:
         table = sector.centroids
         self.counts.centroids += len(table)
         good = np.isfinite(table["range"]) & np.isfinite(table["azimuth"]) & np.isfinite(table["time"])
-        good &= table["range"] >= 0
+        good &= (table["range"] >= 0) & (table["range"] <= _FARTHEST)
         self.counts.invalid += len(table) - int(good.sum())
         plots = self._pending(table[good])
         late = plots["phi"] < (self._next_bin_number - 1) * self._bin
@@ -213,15 +224,18 @@ class Tracker:
         azimuth = table["azimuth"]
         plots["phi"] = azimuth + TURN * np.ceil((angle - azimuth) / TURN - 0.5)
         above_sea = up + (self.radar.site.height if self.radar.site else 0.0)
-        plots["range"] = ground_range(table["range"], table["height"], above_sea)
-        for name in ("sd_range", "sd_azimuth"):
-            claimed = table[name]
-            plots[name] = np.where(np.isfinite(claimed) & (claimed > 0), claimed, self._world.par[name])
+        height = self._possible(
+            table["height"], np.abs(table["height"] - above_sea) <= table["range"] + _OVERHEAD
+        )
+        plots["range"] = ground_range(table["range"], height, above_sea)
+        for name, most in (("sd_range", _FARTHEST), ("sd_azimuth", _WIDEST)):
+            claimed = self._possible(table[name], (table[name] > 0) & (table[name] <= most))
+            plots[name] = np.where(np.isnan(claimed), self._world.par[name], claimed)
         z = from_polar(plots["range"], azimuth, plots["sd_range"], plots["sd_azimuth"])
         plots["e"], plots["n"] = z.mean[:, 0] + east, z.mean[:, 1] + north
         plots["ee"], plots["en"], plots["nn"] = z.cov[:, 0, 0], z.cov[:, 0, 1], z.cov[:, 1, 1]
         plots["s_e"], plots["s_n"] = east, north
-        plots["up"], plots["uu"] = table["height"], _SD_HEIGHT**2
+        plots["up"], plots["uu"] = height, _SD_HEIGHT**2
         if self.settings.dimensions == 2:
             plots["up"] = np.nan
         plots["doppler"], plots["sd_doppler"] = table["doppler"], table["sd_doppler"]
@@ -230,6 +244,12 @@ class Tracker:
         plots["extended"] = table["flags"] & np.uint32(CentroidFlag.EXTENDED) != 0
         plots["weight"] = 1.0
         return plots
+
+    def _possible(self, claimed: Array, can_be: NDArray[np.bool_]) -> Array:
+        """What is claimed, NaN where it cannot be; that is counted."""
+        wrong = ~can_be & ~np.isnan(claimed)
+        self.counts.claims += int(wrong.sum())
+        return np.where(wrong, np.nan, claimed)
 
     @property
     def _bin(self) -> float:
@@ -300,6 +320,13 @@ class Tracker:
         work(self._world, 0, edges[1])
         for other in others:
             other.result()
+
+
+def _sound(sector: Sector) -> bool:
+    """Time, angle and position are such as can be; the beam made a few turns at most."""
+    numbers = (sector.start, sector.stop, sector.begin, sector.end, sector.complete, *sector.position)
+    possible = all(abs(number) <= _HUGE for number in numbers)  # False for NaN
+    return possible and sector.end - sector.begin <= _FEW_TURNS * TURN
 
 
 class _BeamLog:
