@@ -78,9 +78,7 @@ def test_a_code_that_changes_stays_the_same_track():
 @pytest.mark.parametrize("kind", ["mode_3a", "address"])
 def test_many_targets_with_one_identity(kind):
     """An address that several aircraft claim, far apart and side by side: each keeps its track."""
-    targets = np.concatenate(
-        [swarm(12, seed=3, max_range=150e3), CROSSING[:1], CROSSING[:1] + [0, 4e3, 0, 0]]
-    )
+    targets = np.concatenate([swarm(12, seed=3, max_range=150e3), CROSSING[:1], BESIDE])
     scene = Scene(targets, turns=15, p_d=0.95)
     rows, counts = run(coded(scene, **{kind: [4711] * len(targets)}))
     assert counts.lost == 0
