@@ -104,9 +104,26 @@ class Chain:
         left = {
             "plots after the beam had left them": self.clustering.late,
             "centroids after the beam had left them": counts.late,
-            "centroids with a range, azimuth or time that is no number": counts.invalid,
+            "centroids with a range, azimuth or time that cannot be": counts.invalid,
+            "sectors with a time, angle or position that cannot be": counts.broken,
+            "young tracks beyond max_tracks": counts.capped,
         }
         return dict(self.opened.source.skipped) | {reason: n for reason, n in left.items() if n}
+
+    @property
+    def noted(self) -> dict[str, int]:
+        """What the source mended and what the stages did otherwise than asked, counted; nothing was lost."""
+        counts = self.tracker.counts
+        done = {
+            "heights and deviations that cannot be (taken as not claimed)": counts.claims,
+            "centroids wider than a target (they start no track)": counts.extended,
+            "sectors whose time goes back (held)": counts.clock_back,
+            "sectors whose beam goes back (held)": counts.beam_back,
+            "clusters closed before all their tracks were served (wait_deg)": counts.forced,
+            "updates past the exact association's budget (approximated)": counts.approximate,
+            "passes over sectors where the radar did not look (no misses)": counts.blanked,
+        }
+        return dict(self.opened.source.noted) | {what: n for what, n in done.items() if n}
 
     def _timed_tracker(self, sectors: Iterable[Sector]) -> Iterator[Sector]:
         """The tracker stage, its time added up for each turn of the antenna."""

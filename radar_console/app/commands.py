@@ -3,7 +3,7 @@
 import logging
 import os
 import sys
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Annotated, Any
@@ -194,10 +194,10 @@ def track(
     _all_different(source, output, stats)
     with _interruptible(f"what was tracked until then is in {output}"):
         figures = headless.track(opened, output, stats, threaded)
-    _report(figures, opened.source.noted, output)
+    _report(figures, output)
 
 
-def _report(figures: dict[str, Any], noted: Mapping[str, int], output: Path) -> None:
+def _report(figures: dict[str, Any], output: Path) -> None:
     skipped = sum(figures["skipped"].values())
     typer.echo(
         f"{figures['scans']} scans, {figures['plots']:,} plots, {figures['centroids']:,} centroids, "
@@ -207,7 +207,7 @@ def _report(figures: dict[str, Any], noted: Mapping[str, int], output: Path) -> 
     )
     for reason, count in sorted(figures["skipped"].items()):
         typer.echo(f"  skipped {count:,}: {reason}", err=True)
-    for what, count in sorted(noted.items()):
+    for what, count in sorted(figures["noted"].items()):
         typer.echo(f"  noted {count:,}: {what}", err=True)
 
 

@@ -79,6 +79,7 @@ def figures_of(chain: Chain, wall_s: float) -> dict[str, Any]:
         "latency_s": _spread(latency),
         "dropped": chain.gauge.sectors_dropped,
         "skipped": chain.skipped,
+        "noted": chain.noted,
         "wall_s": round(wall_s, 3),
         "peak_rss_mb": peak_rss_mb(),
     }

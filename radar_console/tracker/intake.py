@@ -16,6 +16,9 @@ _TURN = 2.0 * math.pi
 _EXTENDED = int(CentroidFlag.EXTENDED)
 _GRID = 2.0**20  # per s and per m: interpolated values are rounded, so that no cut shows in them
 _SD_HEIGHT = 30.0  # m, of a reported height
+_FARTHEST = 1e8  # m: no radar's range
+_OVERHEAD = 1e3  # m, beyond its range, that a target may be above the radar, by the errors of both
+_WIDEST = 1.0  # rad: an azimuth that is less certain says nothing
 _REFRACTION = 4.0 / 3.0  # of the earth's radius, for the path of a beam
 
 
@@ -60,8 +63,11 @@ def bins(log: Array, known: int, seen: Any, first: int, width: float, beams: Any
 @njit(cache=True, nogil=True, error_model="numpy")
 def take(
     table: Any, log: Array, known: int, closed: float, above_sea: float, heights: bool, par: Any, plots: Any
-) -> tuple[int, int]:
-    """Fill `plots`, a PENDING table, from `table`, CENTROID; how many there are, and how many are late.
+) -> tuple[int, int, int]:
+    """Fill `plots`, a PENDING table, from `table`, CENTROID.
+
+    Returns how many there are, how many are late, and how many claims were left out that cannot be
+    (heights out of reach, deviations that are none); what has no place or time is left out, too.
 
     Parameters
     ----------
@@ -72,12 +78,15 @@ def take(
     """
     time, angles = log[0, :known], log[1, :known]
     east, north, up = log[2, :known], log[3, :known], log[4, :known]
-    n, late = 0, 0
+    n, late, claims = 0, 0, 0
     newest = angles[known - 1]
     for k in range(table.size):
         row = table[k]
         t, r, azimuth = row.time, row.range, row.azimuth
-        if not (math.isfinite(t) and math.isfinite(r) and math.isfinite(azimuth)) or r < 0.0:
+        if (
+            not (math.isfinite(t) and math.isfinite(r) and math.isfinite(azimuth))
+            or not 0.0 <= r <= _FARTHEST
+        ):
             continue
         angle = interpolate(t, time, angles)
         # The watermark bounds what a time can say: nothing below it is delivered any more. What is
@@ -94,12 +103,14 @@ def take(
         plot.s_e = rounded(interpolate(t, time, east))
         plot.s_n = rounded(interpolate(t, time, north))
         sensor_height = above_sea + rounded(interpolate(t, time, up))
-        _height(plot, row, sensor_height)
+        claims += _height(plot, row, sensor_height)
         plot.range = _ground_range(r, plot.up, sensor_height)
         if not heights:
             plot.up = np.nan
-        plot.sd_range = row.sd_range if 0.0 < row.sd_range < math.inf else par.sd_range
-        plot.sd_azimuth = row.sd_azimuth if 0.0 < row.sd_azimuth < math.inf else par.sd_azimuth
+        plot.sd_range = row.sd_range if 0.0 < row.sd_range <= _FARTHEST else par.sd_range
+        plot.sd_azimuth = row.sd_azimuth if 0.0 < row.sd_azimuth <= _WIDEST else par.sd_azimuth
+        claims += plot.sd_range != row.sd_range and not math.isnan(row.sd_range)
+        claims += plot.sd_azimuth != row.sd_azimuth and not math.isnan(row.sd_azimuth)
         de, dn, plot.ee, plot.en, plot.nn = _convert(plot.range, azimuth, plot.sd_range, plot.sd_azimuth)
         plot.e, plot.n = de + plot.s_e, dn + plot.s_n
         plot.doppler, plot.sd_doppler = row.doppler, row.sd_doppler
@@ -107,19 +118,26 @@ def take(
         plot.extended = row.flags & _EXTENDED != 0
         plot.weight = 1.0
         plot.awaited, plot.mark, plot.head = False, -1, -1
-    return n, late
+    return n, late, claims
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _height(plot: Any, row: Any, sensor_height: float) -> None:
-    """The reported height, or that of the elevation over a round earth; NaN without either."""
+def _height(plot: Any, row: Any, sensor_height: float) -> int:
+    """The reported height, or that of the elevation over a round earth; NaN without either.
+
+    1 if a height was reported that is farther above or below the radar than the target is away.
+    """
     plot.up, plot.uu = row.height, _SD_HEIGHT * _SD_HEIGHT
+    wrong = not math.isnan(plot.up) and not abs(plot.up - sensor_height) <= row.range + _OVERHEAD
+    if wrong:
+        plot.up = np.nan
     if math.isnan(plot.up) and math.isfinite(row.elevation):
         r, sine = row.range, math.sin(row.elevation)
         level = r * math.cos(row.elevation)
         plot.up = sensor_height + r * sine + level * level / (2.0 * _REFRACTION * MEAN_RADIUS)
         if row.sd_elevation > 0.0:
             plot.uu = max((level * row.sd_elevation) ** 2, 1.0)
+    return int(wrong)
 
 
 @njit(cache=True, nogil=True, error_model="numpy")

@@ -65,6 +65,7 @@ _LEAST_SHARE = 4  # members for each thread
 _CLIMB_NOISE = 1.0  # m²/s³, of the rate of climb
 _LOG = 2048  # sectors that are remembered, to find where the beam was
 _FEW_TURNS = 4
+_HUGE = 1e12  # s, rad and m: no sector's
 
 
 @dataclass(slots=True)
@@ -72,7 +73,8 @@ class Counts:
     """What the tracker did, and what it had to leave."""
 
     centroids: int = 0
-    invalid: int = 0  # centroids with a range, azimuth or time that is no number
+    invalid: int = 0  # centroids with a range, azimuth or time that cannot be
+    claims: int = 0  # heights and deviations of centroids that cannot be, taken as not claimed
     late: int = 0  # centroids below the watermark: their bin was closed
     extended: int = 0  # centroids that could not start a track: wider than a target
     started: int = 0
@@ -86,6 +88,7 @@ class Counts:
     capped: int = 0  # young tracks that went because there were too many
     clock_back: int = 0  # sectors whose time went back
     beam_back: int = 0  # sectors whose angle went back
+    broken: int = 0  # sectors whose time, angle or position cannot be: they are passed on as they are
 
 
 class Tracker:
@@ -130,6 +133,11 @@ class Tracker:
 
     def push(self, sector: Sector) -> Sector:
         """The sector, with a row for each track that was served by it, hit or missed."""
+        if not _sound(sector):
+            self._counts.broken += 1
+            self._counts.centroids += len(sector.centroids)
+            self._counts.invalid += len(sector.centroids)
+            return sector
         if sector.stop < sector.start or (self._last and sector.start < self._last.stop):
             self._counts.clock_back += 1
         if sector.end < sector.begin or (self._last and sector.end < self._last.end):
@@ -198,13 +206,14 @@ class Tracker:
         waiting = self._queue[self._world.books.size[N_QUEUE] :]
         fresh = np.empty(len(table), PENDING)
         closed = (self._next_bin_number - 1) * self._bin
-        n, late = take(
+        n, late, claims = take(
             table, *self._log.known, closed, self._above_sea, self.settings.dimensions == 3, self._world.par,
             fresh,
         )  # fmt: skip
         self._counts.centroids += len(table)
         self._counts.invalid += len(table) - n - late
         self._counts.late += late
+        self._counts.claims += claims
         self._queue = np.empty(len(waiting) + n, PENDING)
         merge(waiting, fresh[:n], self._queue)
         self._world.books.size[N_QUEUE] = 0
@@ -279,6 +288,13 @@ class Tracker:
         work(self._world, 0, edges[1])
         for other in others:
             other.result()
+
+
+def _sound(sector: Sector) -> bool:
+    """Time, angle and position are such as can be; the beam made a few turns at most."""
+    numbers = (sector.start, sector.stop, sector.begin, sector.end, sector.complete, *sector.position)
+    possible = all(abs(number) <= _HUGE for number in numbers)  # False for NaN
+    return possible and sector.end - sector.begin <= _FEW_TURNS * TURN
 
 
 class _BeamLog:

@@ -57,11 +57,21 @@ def test_tracks_and_figures(command: Command, small: Path) -> None:
     figures = json.loads((small.parent / "s.json").read_text(encoding="utf-8"))
     assert list(figures) == [
         *("scans", "plots", "centroids", "tracks_confirmed", "tracker_s_per_scan", "latency_s"),
-        *("dropped", "skipped", "wall_s", "peak_rss_mb"),
+        *("dropped", "skipped", "noted", "wall_s", "peak_rss_mb"),
     ]
     assert (figures["scans"], figures["tracks_confirmed"], figures["dropped"]) == (12, 3, 0)
     assert list(figures["latency_s"]) == ["median", "p99", "max"]
     assert 0.0 < figures["latency_s"]["median"] < figures["latency_s"]["max"] <= 4.0
+
+
+def test_a_capacity_that_was_reached_is_said(
+    command: Command, small: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    small.write_text(small.read_text(encoding="utf-8") + "[tracker]\nmax_tracks = 2\n", encoding="utf-8")
+    assert command("track", small, "-o", "t.csv", "--stats", "s.json") == 0
+    figures = json.loads((small.parent / "s.json").read_text(encoding="utf-8"))
+    assert figures["skipped"]["young tracks beyond max_tracks"] > 0
+    assert "young tracks beyond max_tracks" in capsys.readouterr().err
 
 
 def test_a_plot_ordinal_leads_back_to_its_plot(command: Command, small: Path) -> None:

@@ -6,8 +6,10 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from radar_console.core.geometry import wrap
-from radar_console.core.messages import CENTROID, NO_TRACKS, Radar, Sector, blank
+from radar_console.core.messages import CENTROID, NO_TRACKS, Radar, Sector, TrackStatus, blank
 from radar_console.core.units import TURN
+from radar_console.scenario import TrackerSettings
+from radar_console.tracker import Tracker
 
 RADAR = Radar("test", rotation=4.0, max_range=300e3, sd_range=50.0, sd_azimuth=math.radians(0.1))
 
@@ -27,6 +29,7 @@ class Scene:
     seed: int = 1
     noise: float = 1.0
     turn_times: list[float] = field(default_factory=list)  # of each turn, s; the radar's if empty
+    sensor: tuple[float, float] = (0.0, 0.0)  # m/s: its sectors say that the radar moves
 
     def __post_init__(self):
         times = self.turn_times or [self.radar.rotation] * self.turns
@@ -104,9 +107,11 @@ class Scene:
             # A centroid appears a lag after the beam has met it: with the sector that ends there.
             low = max(begin - lag, 0.0) if begin > 0 else -math.inf
             part = (angles >= low) & (angles < (complete if end < self.angles[-1] else math.inf))
+            stop = float(self.time_of(end))
             yield Sector(
-                self.radar, float(self.time_of(begin)), float(self.time_of(end)), begin + rotate,
-                float(end) + rotate, complete + rotate, centroids=table[part],
+                self.radar, float(self.time_of(begin)), stop, begin + rotate, float(end) + rotate,
+                complete + rotate, (self.sensor[0] * stop, self.sensor[1] * stop, 0.0),
+                centroids=table[part],
             )  # fmt: skip
             begin = float(end)
 
@@ -132,3 +137,102 @@ def swarm(count, seed=0, max_range=250e3, speed=(100.0, 300.0)):
 def rows_of(sectors):
     """All track rows of a stream."""
     return np.concatenate([NO_TRACKS, *(sector.tracks for sector in sectors)])
+
+
+def settings(**changes):
+    """The tracker's, with few particles and a known, thin clutter."""
+    return TrackerSettings(**({"particles": 100, "clutter_per_km2": 1e-4} | changes))
+
+
+def run(sectors, radar=RADAR, seed=7, threads=1, **changes):
+    """All track rows of a stream, and the tracker's counts."""
+    tracker = Tracker(settings(**changes), radar, seed, threads)
+    return rows_of(tracker(sectors)), tracker.counts
+
+
+def same(a, b):
+    return a.tobytes() == b.tobytes()
+
+
+def held(rows):
+    """Numbers of the tracks that were confirmed at some time."""
+    return np.unique(rows["track"][rows["status"] == TrackStatus.CONFIRMED])
+
+
+def of_track(rows, track):
+    return rows[rows["track"] == track]
+
+
+def target_of(rows, scene, track):
+    """The target that most plots of a track are from; -1 if it is clutter."""
+    mine = of_track(rows, track)
+    origin = scene.origin[mine["plot"][mine["plot"] >= 0]]
+    if not len(origin) or np.mean(origin >= 0) <= 0.5:
+        return -1
+    return int(np.bincount(origin[origin >= 0]).argmax())
+
+
+def swaps(rows, scene):
+    """How many tracks end with another target's plots than they were confirmed with, five each."""
+    count = 0
+    for track in held(rows):
+        mine = of_track(rows, track)
+        origin = scene.origin[mine["plot"][mine["hit"] & (mine["status"] == TrackStatus.CONFIRMED)]]
+        origin = origin[origin >= 0]
+        count += np.bincount(origin[:5]).argmax() != np.bincount(origin[-5:]).argmax()
+    return count
+
+
+def one_turn(table, turn=0, radar=RADAR, **changes):
+    """A sector of a whole turn of 4 s."""
+    values = {"start": 4.0 * turn, "stop": 4.0 * turn + 4.0, "begin": TURN * turn, "end": TURN * (turn + 1)}
+    values |= {"complete": values["end"]} | changes
+    return Sector(radar, **values, centroids=table)
+
+
+def table_of(time, distance, azimuth, first=0, **values):
+    """Centroids that say nothing but where and when, and `values`; numbered from `first`."""
+    time, distance, azimuth = np.broadcast_arrays(*(np.asarray(v, float) for v in (time, distance, azimuth)))
+    table = blank(CENTROID, time.size)
+    table["time"], table["range"], table["azimuth"] = time.ravel(), distance.ravel(), azimuth.ravel()
+    table["ordinal"] = first + np.arange(time.size)
+    return with_values(table, values)
+
+
+def with_values(table, values):
+    """A copy of the table with some columns replaced."""
+    table = table.copy()
+    for name, value in values.items():
+        table[name] = value
+    return table
+
+
+def nothing(first, last):
+    """Turns without a centroid."""
+    return [one_turn(table_of([], [], []), turn) for turn in range(first, last)]
+
+
+STATE_COLUMNS = ("time", "east", "north", "v_east", "v_north")
+SD_COLUMNS = ("sd_east", "sd_north", "sd_v_east", "sd_v_north")
+
+
+def sound(rows):
+    """Every row has a state and its deviations, and the probability of a plot is one."""
+    numbers = all(np.isfinite(rows[name]).all() for name in STATE_COLUMNS + SD_COLUMNS)
+    deviations = all((rows[name] >= 0.0).all() for name in SD_COLUMNS)
+    seen = rows["plot"] >= 0
+    probability = rows["probability"][seen]
+    certain = bool(np.all((probability >= 0.0) & (probability <= 1.0 + 1e-9)))
+    return numbers and deviations and certain and bool(np.isnan(rows["probability"][~seen]).all())
+
+
+FILTERS = {
+    "kalman": {"filter": "kalman"},
+    "extended": {"filter": "extended"},
+    "unscented": {"filter": "unscented"},
+    "imm": {"filter": "imm"},
+    "adapted": {"filter": "particle"},
+    "optimal": {"filter": "particle", "proposal": "optimal"},
+    "prior": {"filter": "particle", "proposal": "prior"},
+    "two models": {"filter": "particle", "models": ("cv", "ct")},
+}

@@ -1,0 +1,182 @@
+"""How tracks start, branch, are confirmed, given up, merged, and what goes when there are too many."""
+
+import math
+
+import numpy as np
+import pytest
+from scenes import RADAR, Scene, held, of_track, one_turn, run, settings, sound, swarm, table_of, target_of
+
+from radar_console.core.messages import TrackStatus
+from radar_console.core.units import TURN
+from radar_console.tracker import Tracker
+from radar_console.tracker.records import N_TRACKS
+
+MODES = ["auto", "m-of-n", "score", "branching"]
+
+
+def blinking(pattern):
+    """A target at rest, seen ("1") or not ("0") in each turn."""
+    return [
+        one_turn(table_of(4.0 * k + 1.0, [5e4] if seen == "1" else [], 1.5, k), k)
+        for k, seen in enumerate(pattern)
+    ]
+
+
+def confirmed_in(rows):
+    """The turn in which the first track was confirmed; None if none was."""
+    confirmed = rows[rows["status"] == TrackStatus.CONFIRMED]
+    return int(confirmed["time"].min() // 4.0) if len(confirmed) else None
+
+
+@pytest.mark.parametrize(
+    ("pattern", "turn"), [("11111", 2), ("11001", 4), ("10101", 4), ("11000", None), ("10001", None)]
+)
+def test_three_of_five(pattern, turn):
+    assert confirmed_in(run(blinking(pattern), initiation="m-of-n")[0]) == turn
+
+
+@pytest.mark.parametrize(("hits", "passes", "turn"), [(3, 3, 2), (4, 5, 3), (5, 8, 4)])
+def test_any_m_of_n(hits, passes, turn):
+    found = run(blinking("1" * 10), initiation="m-of-n", confirm_hits=hits, confirm_passes=passes)[0]
+    assert confirmed_in(found) == turn
+
+
+def test_m_of_n_gives_up_as_soon_as_it_cannot_be_reached():
+    rows, counts = run(blinking("110000000"), initiation="m-of-n")
+    first = of_track(rows, 0)
+    assert first["status"][-1] == TrackStatus.DELETED
+    assert first["time"][-1] // 4.0 == 4  # two hits in five passes
+    assert counts.confirmed == 0
+
+
+def test_more_evidence_takes_longer():
+    """At least three plots; then the higher the score that is asked for, the later."""
+    turns = [
+        confirmed_in(run(blinking("1" * 15), initiation="score", confirm_score=score)[0])
+        for score in (-5.0, 6.9, 20.0, 40.0)
+    ]
+    assert turns[0] == 2
+    assert turns == sorted(turns)
+    assert turns[-1] > 4
+    assert confirmed_in(run(blinking("1" * 15), initiation="score", confirm_score=1e6)[0]) is None
+
+
+@pytest.mark.parametrize("p_d", [0.5, 0.7, 0.9])
+@pytest.mark.parametrize("initiation", ["score", "branching"])
+def test_a_young_track_goes_when_its_score_has_fallen(p_d, initiation):
+    """By 4.6 from its peak: each miss takes ln(1 - P_D P_G)."""
+    rows, counts = run(blinking("11" + "0" * 12), initiation=initiation, p_d=p_d)
+    assert counts.confirmed == 0
+    track = of_track(rows, 0)
+    misses = math.ceil(4.6 / -math.log(1.0 - p_d * 0.9999))
+    assert len(track) == 2 + misses
+    assert track["status"][-1] == TrackStatus.DELETED
+
+
+@pytest.mark.parametrize("initiation", MODES)
+@pytest.mark.parametrize("branch", [0, 1])
+def test_an_ambiguous_second_plot_is_decided_later(branch, initiation):
+    """Two plots may be the second of one starter: whichever goes on, its track has the first plot.
+
+    The one flies east, the other west, both at 200 m/s; the turn after their common start both are
+    there, then only one.
+    """
+    sectors, ordinal = [], 0
+    for k in range(7):
+        sides = [0] if k == 0 else [0, 1] if k == 1 else [branch]
+        east = np.array([(-800.0, 800.0)[side] * k for side in sides])
+        distance, azimuth = np.hypot(east, 5e4), np.arctan2(east, 5e4) + 1.0
+        time = 4.0 * k + 4.0 * azimuth / (2 * math.pi)
+        sectors.append(one_turn(table_of(time, distance, azimuth, ordinal), k))
+        ordinal += len(sides)
+    rows, _ = run(sectors, initiation=initiation)
+    born_first = rows[(rows["status"] == TrackStatus.CONFIRMED) & (rows["born"] < 4.0)]
+    assert len(np.unique(born_first["track"])) == 1
+    last = born_first[-1]
+    across = last["east"] * math.cos(1.0) - last["north"] * math.sin(1.0)
+    assert across == pytest.approx((-800.0, 800.0)[branch] * 6, abs=4 * last["sd_east"])
+
+
+@pytest.fixture(scope="module")
+def crowd():
+    return Scene(swarm(40, seed=3, max_range=60e3), turns=10, clutter=4000 / (math.pi * 300e3**2))
+
+
+@pytest.mark.parametrize("initiation", MODES)
+def test_numbers_are_unique_and_every_track_that_ends_says_so(crowd, initiation):
+    tracker = Tracker(settings(initiation=initiation, clutter_per_km2=None), RADAR, 7, 1)
+    tables = [tracker.push(sector).tracks for sector in crowd.sectors()]
+    world = tracker._world
+    tracks = world.tracks[: world.size[N_TRACKS]]
+    heard = tracks["id"][tracks["voiced"]]
+    assert len(heard) == len(set(heard.tolist()))
+    rows = np.concatenate(tables)
+    assert sound(rows)
+    ended = rows["track"][rows["status"] == TrackStatus.DELETED]
+    assert len(ended) == len(set(ended.tolist()))
+    assert set(rows["track"].tolist()) - set(ended.tolist()) == set(heard.tolist())
+    order = np.lexsort((np.arange(len(rows)), rows["track"]))
+    of, status, time = rows["track"][order], rows["status"][order], rows["time"][order]
+    born = rows["born"][order]
+    same_track = of[1:] == of[:-1]
+    same_branch = same_track & (born[1:] == born[:-1])
+    # Nothing follows a track's end. A branch has one row for a pass, and a second where it is merged; a
+    # number may go over to another branch.
+    assert not np.any(same_track & (status[:-1] == TrackStatus.DELETED))
+    assert np.all(time[1:][same_branch] >= time[:-1][same_branch])
+    twice = same_branch & (time[1:] == time[:-1])
+    assert np.all(status[1:][twice] == TrackStatus.DELETED)
+    counts = tracker.counts
+    assert counts.deleted + counts.lost + counts.merged >= len(ended) - counts.capped
+    assert len(ended) > 1000
+
+
+@pytest.mark.parametrize("initiation", MODES)
+def test_targets_are_found_by_every_initiation(initiation):
+    scene = Scene(swarm(30, seed=3, max_range=200e3), turns=12, clutter=200 / (math.pi * 300e3**2))
+    rows, counts = run(scene.sectors(), initiation=initiation, clutter_per_km2=None)
+    assert {target_of(rows, scene, track) for track in held(rows)} >= set(range(30))
+    if initiation != "m-of-n":  # which confirms a false track now and then
+        assert counts.lost == 0
+        assert len(held(rows)) == 30
+
+
+@pytest.mark.parametrize("initiation", MODES)
+def test_tracks_with_the_same_plots_become_one(initiation):
+    """A target that gives two plots a turn, side by side, ends up in no more than two tracks."""
+    sectors = [
+        one_turn(table_of(4.0 * k + 1.0, [5e4, 5e4 + 20.0], 1.5, 2 * k), k) for k in range(12)
+    ]  # fmt: skip
+    rows, counts = run(sectors, initiation=initiation)
+    last = {row["track"]: row["status"] for row in rows}
+    alive = [track for track, status in last.items() if status == TrackStatus.CONFIRMED]
+    assert 1 <= len(alive) <= 2
+    assert counts.merged + counts.deleted + counts.lost == sum(
+        status == TrackStatus.DELETED for status in last.values()
+    )
+    assert counts.merged > 0
+
+
+def test_capacity_takes_the_least_likely_young_tracks(crowd):
+    """Confirmed tracks stay, there are never more than the capacity, and what went is counted.
+
+    The clutter begins when the targets are confirmed: it would leave no room for their starts.
+    """
+    late_clutter = []
+    for sector in crowd.sectors():
+        table = sector.centroids
+        keep = (crowd.origin[table["ordinal"]] >= 0) | (sector.begin > 6 * TURN)
+        late_clutter.append(sector.adding(centroids=table[keep]))
+    tracker = Tracker(settings(max_tracks=80, clutter_per_km2=None), RADAR, 7, 1)
+    rows = []
+    for sector in late_clutter:
+        rows.append(tracker.push(sector).tracks)
+        assert tracker._world.size[N_TRACKS] <= 80
+    rows, counts = np.concatenate(rows), tracker.counts
+    assert counts.capped > 1000
+    assert counts.lost == 0
+    assert {target_of(rows, crowd, track) for track in held(rows)} == set(range(40))
+
+
+def test_without_too_many_tracks_none_is_capped(crowd):
+    assert run(crowd.sectors())[1].capped == 0
