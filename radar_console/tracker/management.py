@@ -131,6 +131,14 @@ def serve(
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
+def _highest_score(par: Any) -> float:
+    """The score that `delete_misses` misses in a row, and no fewer, take away."""
+    miss = math.log(max(1.0 - par.p_d * par.p_g, 1e-3))
+    highest: float = _FIRST_SCORE - (par.delete_misses + 0.5) * miss
+    return highest
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
 def _keep(track: Any, index: int, hit: bool, par: Any, books: Books) -> int:
     """Coast or delete a confirmed track; its status after this pass.
 
@@ -138,8 +146,7 @@ def _keep(track: Any, index: int, hit: bool, par: Any, books: Books) -> int:
     and so does evidence that says less and less for the target: in dense clutter there is always
     some plot in the gate.
     """
-    enough = _FIRST_SCORE - (par.delete_misses + 0.5) * math.log(max(1.0 - par.p_d * par.p_g, 1e-3))
-    track.score = min(track.score, max(enough, par.confirm_score))
+    track.score = min(track.score, max(_highest_score(par), par.confirm_score))
     if track.misses >= par.delete_misses or track.score < _FIRST_SCORE:
         kill(track, index, books)
         books.tally[C_LOST] += 1
@@ -152,7 +159,8 @@ def _judge(track: Any, index: int, hit: bool, par: Any, books: Books) -> int:
     """Find a young track proven, or delete it; its status after this pass."""
     track.peak = max(track.peak, track.score)
     fast = _too_fast(track, par)
-    track.proven = track.level == TENTATIVE and hit and not fast and _proven(track, par)
+    ripe = track.level == TENTATIVE and hit and track.hits >= _LEAST_HITS
+    track.proven = ripe and not fast and _proven(track, par)
     if not track.proven and (fast or _hopeless(track, par)):
         kill(track, index, books)
         books.tally[C_DELETED] += track.voiced
@@ -182,6 +190,7 @@ def adopt(index: int, sensor_e: float, sensor_n: float, w: World) -> None:
     track, par = w.tracks[index], w.par
     track.curve[0] = track.curve[1] = track.growth[1] = 0.0
     track.growth[0] = track.growth[2] = par.q / 3.0
+    track.score = track.peak = max(_highest_score(par), par.confirm_score)
     track.level, track.slot = CONFIRMED, w.books.size[N_SLOTS]
     w.belief.owner[track.slot] = index
     w.books.wake[index] = -math.inf
@@ -214,10 +223,10 @@ def _proven(track: Any, par: Any) -> bool:
         return bool(counted)
     scored = track.score >= par.confirm_score
     if par.initiation == SCORE:
-        return bool(scored and track.hits >= _LEAST_HITS)
+        return bool(scored)
     if by_score(track, par):
         enough = par.confirm_score + _DENSER + _DOUBT * track.passes
-        return bool(track.score >= enough and track.hits >= _LEAST_HITS)
+        return bool(track.score >= enough)
     return bool(counted and scored)
 
 

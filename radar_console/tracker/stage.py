@@ -182,7 +182,6 @@ class Tracker:
         beam, (east, north, _) = float(self._log.angle[-1]), self._last.position
         azimuth = np.arctan2(tracks["east"] - east, tracks["north"] - north)
         rows["psi"] = beam - np.mod(beam - azimuth, TURN)
-        rows["score"] = rows["peak"] = self.settings.confirm_score
         rows["last"] = rows["previous"] = rows["first"] = rows["mode_3a"] = rows["address"] = -1
         rows["hits"] = rows["passes"] = self.settings.confirm_hits
         rows["history"], rows["voiced"] = 1, True

@@ -315,13 +315,13 @@ def _before(a: int, b: int, w: World) -> bool:
 @njit(cache=True, nogil=True, error_model="numpy")
 def _absorb(stays: int, ends: Any, same: bool, w: World) -> None:
     """Have one track speak for the young ones that end on its plot; `same`: and have its last but one."""
-    a, heir = w.tracks[stays], -1
+    a, heir, born = w.tracks[stays], -1, 0.0
     for index in ends:
         b = w.tracks[index]
         if index == stays or b.dead or b.level == CONFIRMED or (same and b.previous != a.previous):
             continue
         if b.voiced and not a.voiced and (heir < 0 or b.id < heir):
-            heir = b.id
+            heir, born = b.id, b.born
     for index in ends:
         b = w.tracks[index]
         if index == stays or b.dead or b.level == CONFIRMED or (same and b.previous != a.previous):
@@ -331,7 +331,7 @@ def _absorb(stays: int, ends: Any, same: bool, w: World) -> None:
             w.books.tally[C_MERGED] += 1
         _kill(b, index, w.books)
     if heir >= 0:
-        a.id, a.voiced = heir, True
+        a.id, a.born, a.voiced = heir, born, True
 
 
 @njit(cache=True, nogil=True, error_model="numpy")

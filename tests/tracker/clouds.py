@@ -19,7 +19,7 @@ class Cloud:
         self.settings = TrackerSettings(particles=particles, **chosen)
         radar = Radar("", 4.0, 300e3, 50.0, math.radians(0.1))
         self.par = stage._parameters(self.settings, radar, seed)[0]
-        room = stage._empty_belief(self.settings)
+        room = stage._empty_world(self.settings, radar, seed).belief
         self.belief = room._replace(
             **{
                 name: np.zeros((tracks, *getattr(room, name).shape[1:]), getattr(room, name).dtype)
