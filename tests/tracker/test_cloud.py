@@ -52,7 +52,7 @@ def exact(prior, pool, miss, beta, outliers=0.0):
             parts.append(state)
             g.append(part * math.exp(log_g))
         weights += [b * value / sum(g) for value in g]
-        logs.append(math.log(sum(g)) + (math.log(800.0) if rated else 0.0))
+        logs.append(math.log(sum(g)))
     stack = Gaussian(np.stack([p.mean for p in parts]), np.stack([p.cov for p in parts]))
     return collapse(np.array(weights), stack), np.array(logs)
 

@@ -66,7 +66,7 @@ def test_a_patch_that_moves_with_a_target(mean):
     scene = Scene(np.array([(-20e3, 60e3, 250.0, 0.0)]), turns=25, disc=(3e3, mean))
     tracker = after(scene)
     world = tracker._world
-    tracks = world.tracks[: world.size[N_TRACKS]]
+    tracks = world.tracks[: world.books.size[N_TRACKS]]
     place = scene.targets[0, :2] + scene.edges[-1] * scene.targets[0, 2:]
     near = tracks[np.hypot(*(tracks["x"][:, :2] - place).T) < 3e3]
     longest = near[np.argmax(near["hits"])]

@@ -107,7 +107,7 @@ def test_numbers_are_unique_and_every_track_that_ends_says_so(crowd, initiation)
     tracker = Tracker(settings(initiation=initiation, clutter_per_km2=None), RADAR, 7, 1)
     tables = [tracker.push(sector).tracks for sector in crowd.sectors()]
     world = tracker._world
-    tracks = world.tracks[: world.size[N_TRACKS]]
+    tracks = world.tracks[: world.books.size[N_TRACKS]]
     heard = tracks["id"][tracks["voiced"]]
     assert len(heard) == len(set(heard.tolist()))
     rows = np.concatenate(tables)
@@ -117,15 +117,13 @@ def test_numbers_are_unique_and_every_track_that_ends_says_so(crowd, initiation)
     assert set(rows["track"].tolist()) - set(ended.tolist()) == set(heard.tolist())
     order = np.lexsort((np.arange(len(rows)), rows["track"]))
     of, status, time = rows["track"][order], rows["status"][order], rows["time"][order]
-    born = rows["born"][order]
     same_track = of[1:] == of[:-1]
-    same_branch = same_track & (born[1:] == born[:-1])
-    # Nothing follows a track's end. A branch has one row for a pass, and a second where it is merged; a
-    # number may go over to another branch.
+    # Nothing follows a track's end. When a number goes over to another branch in a pass, that branch's time
+    # in the same pass may be a little earlier: it weighed the plots differently.
     assert not np.any(same_track & (status[:-1] == TrackStatus.DELETED))
-    assert np.all(time[1:][same_branch] >= time[:-1][same_branch])
-    twice = same_branch & (time[1:] == time[:-1])
-    assert np.all(status[1:][twice] == TrackStatus.DELETED)
+    assert np.all(np.diff(time)[same_track] > -0.5 * RADAR.rotation)
+    born = rows["born"][order]
+    assert np.all((born[1:] == born[:-1])[same_track])
     counts = tracker.counts
     assert counts.deleted + counts.lost + counts.merged >= len(ended) - counts.capped
     assert len(ended) > 1000
@@ -171,7 +169,7 @@ def test_capacity_takes_the_least_likely_young_tracks(crowd):
     rows = []
     for sector in late_clutter:
         rows.append(tracker.push(sector).tracks)
-        assert tracker._world.size[N_TRACKS] <= 80
+        assert tracker._world.books.size[N_TRACKS] <= 80
     rows, counts = np.concatenate(rows), tracker.counts
     assert counts.capped > 1000
     assert counts.lost == 0

@@ -156,8 +156,8 @@ def test_after_its_service_a_track_is_a_turn_away():
         world = tracker._world
         beam = np.zeros(1, BEAM)[0]
         beam["phi"], beam["t"] = sector.complete, sector.stop
-        tracks = world.tracks[: world.size[N_TRACKS]].copy()
-        for edge in world.edges[: world.size[N_EDGES]]:
+        tracks = world.tracks[: world.books.size[N_TRACKS]].copy()
+        for edge in world.edges[: world.books.size[N_EDGES]]:
             track, plot = tracks[edge["track"]], world.pool[edge["plot"]]
             if edge["spent"]:
                 continue
@@ -179,7 +179,7 @@ def test_no_plot_is_used_for_more_than_one(monkeypatch, associator):
 
     def spy(world):
         original(world)
-        for member in world.members[: world.size[N_MEMBERS]]:
+        for member in world.members[: world.books.size[N_MEMBERS]]:
             assert member["used"] <= 1.0 + 1e-9
             if world.tracks[member["track"]]["swept"]:
                 for pair in world.pairs[member["pairs"] : member["pairs"] + member["kept"]]:

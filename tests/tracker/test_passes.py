@@ -120,7 +120,7 @@ def test_every_track_that_was_not_ended_is_still_in_the_table(bins):
     rows = [tracker.push(sector).tracks for sector in scene.sectors()]
     last = {row["track"]: row["status"] for table in rows for row in table}
     alive = {track for track, status in last.items() if status != TrackStatus.DELETED}
-    table = tracker._world.tracks[: tracker._world.size[N_TRACKS]]
+    table = tracker._world.tracks[: tracker._world.books.size[N_TRACKS]]
     heard = table["voiced"] & ~table["dead"]
     assert {int(track) for track in table["id"][heard]} == alive
     assert len(last) > len(alive) > 40

@@ -60,7 +60,7 @@ def nis_of(seed, **changes):
             rows.append((times[turn], distance, azimuth % TURN, number))
         time, distance, azimuth, number = np.array(sorted(rows)).T
         world = tracker._world
-        tracks = world.tracks[: world.size[N_TRACKS]]
+        tracks = world.tracks[: world.books.size[N_TRACKS]]
         tracks = tracks[tracks["level"] == CONFIRMED]
         for t, r, a in zip(time, distance, azimuth, strict=True) if turn >= FIRST else ():
             e, n, ee, en, nn = convert(r, a, RADAR.sd_range, RADAR.sd_azimuth)

@@ -1,14 +1,11 @@
 """Every associator, gate, filter and likelihood from end to end, and tracks that are taken over."""
 
-import math
-
 import numpy as np
 import pytest
 from scenes import FILTERS, RADAR, Scene, held, nothing, of_track, ring, run, settings, sound, target_of
 
 from radar_console.core.messages import NO_TRACKS, TRACK, TrackStatus, blank
 from radar_console.tracker import Tracker
-from radar_console.tracker.management import FIRST_SCORE
 
 
 @pytest.fixture(scope="module")
@@ -94,9 +91,7 @@ def test_adopted_tracks_without_plots_coast_and_end():
     rows = np.concatenate([tracker.push(sector).tracks for sector in nothing(1, 10)])
     assert sound(rows)
     assert tracker.counts.lost == 25
-    # They have the score of a track that was just confirmed, which so many misses take away.
-    misses = math.ceil((settings().confirm_score - FIRST_SCORE) / -math.log(1.0 - 0.9 * 0.9999))
-    assert (rows["status"] == TrackStatus.COASTING).sum() == 25 * (misses - 1)
+    assert (rows["status"] == TrackStatus.COASTING).sum() == 25 * (settings().delete_misses - 1)
 
 
 def test_many_are_adopted_and_none():
