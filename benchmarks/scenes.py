@@ -29,6 +29,9 @@ PERIOD = 4.0  # s, of a scan
 QUICK_TURN = 1e-3  # s, of the beam in a snapshot
 _SEAM = 1e-6  # rad past a bin's edge, so that a whole turn of bins is complete when the turn is
 _BINS = 256
+G = 9.80665  # m/s²
+_SPEED = 250.0  # m/s, of manoeuvring targets
+_LEG = 40.0, 80.0  # s, straight flight between manoeuvres
 
 RETURN = np.dtype(
     [
@@ -187,6 +190,64 @@ def swarm(count: int, seed: int, swept: bool = False, scans: int = 60, false: in
     return _scene(f"swarm{count}", seed, Paths(step, states), scans, swept, clutter, density, 0.1 * DEG)
 
 
+def turns(seed: int, swept: bool = False, scans: int = 60, count: int = 20) -> Scene:
+    """Targets at 250 m/s that turn by 30 to 180° at 3 g, between 40 and 80 s of straight flight."""
+    rate = 3.0 * G / _SPEED
+
+    def turn(rng: np.random.Generator) -> tuple[float, float, float]:
+        return rng.uniform(30.0, 180.0) * DEG / rate, rate * rng.choice((-1.0, 1.0)), 0.0
+
+    return _manoeuvring("turns", seed, swept, scans, count, turn)
+
+
+def sprints(seed: int, swept: bool = False, scans: int = 60, count: int = 20) -> Scene:
+    """Targets at 250 m/s that change to 100 or 400 m/s by 15 m/s² for 10 s, and next time back again."""
+
+    def sprint(rng: np.random.Generator) -> tuple[float, float, float]:
+        return 10.0, 0.0, rng.choice((-15.0, 15.0))
+
+    return _manoeuvring("sprints", seed, swept, scans, count, sprint)
+
+
+# Duration s, rate of turn rad/s, and acceleration m/s² of a target's next manoeuvre.
+Manoeuvre = Callable[[np.random.Generator], tuple[float, float, float]]
+
+
+def _manoeuvring(name: str, seed: int, swept: bool, scans: int, count: int, draw: Manoeuvre) -> Scene:
+    """Targets on random courses from 60 to 150 km away, each in a disc of ring25's light clutter.
+
+    A manoeuvre follows each 40 to 80 s of straight flight; every other acceleration takes back the one
+    before it. The targets move in pieces of a quarter of a second.
+    """
+    rng = np.random.default_rng((seed, count, 3))
+    pieces, step = 16 * scans, PERIOD / 16
+    turning, pulling = np.zeros((pieces, count)), np.zeros((pieces, count))
+    for target in range(count):
+        start, back = round(rng.uniform(*_LEG) / step), 0.0
+        while start < pieces:
+            duration, rate, pull = draw(rng)
+            pull = -back if back else pull
+            back = 0.0 if back else pull
+            stop = start + round(duration / step)
+            turning[start:stop, target], pulling[start:stop, target] = rate, pull
+            start = stop + round(rng.uniform(*_LEG) / step)
+    # A piece's velocity is that of its middle.
+    heading = rng.uniform(0.0, TURN, count) + step * (np.cumsum(turning, axis=0) - 0.5 * turning)
+    speed = _SPEED + step * (np.cumsum(pulling, axis=0) - 0.5 * pulling)
+    velocity = speed[..., None] * _direction(heading)
+    first = to_cartesian(rng.uniform(60.0, 150.0, count) * KM, rng.uniform(0.0, TURN, count))
+    position = np.stack(first, axis=1) + step * (np.cumsum(velocity, axis=0) - velocity)
+    radius = 15.0 * KM
+
+    def clutter(rng: np.random.Generator, targets: Array) -> Array:
+        false = rng.poisson(5.0, count)
+        return np.repeat(targets[:, :2], false, axis=0) + _disc(rng, radius, int(false.sum()))
+
+    paths = Paths(step, np.concatenate([position, velocity], axis=2))
+    density = 5.0 / (math.pi * radius**2)
+    return _scene(name, seed, paths, scans, swept, clutter, density, 0.1 * DEG)
+
+
 def _scene(
     name: str, seed: int, paths: Paths, scans: int, swept: bool, clutter: Clutter, density: float,
     sd_azimuth: float,
@@ -328,5 +389,5 @@ def _disc(rng: np.random.Generator, radius: float, count: int) -> Array:
 
 
 def _direction(heading: Array) -> Array:
-    """Unit vectors (n, 2)."""
-    return np.stack([np.sin(heading), np.cos(heading)], axis=1)
+    """Unit vectors (..., 2)."""
+    return np.stack([np.sin(heading), np.cos(heading)], axis=-1)

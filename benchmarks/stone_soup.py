@@ -33,6 +33,7 @@ from stonesoup.initiator.simple import MultiMeasurementInitiator
 from stonesoup.measures import Mahalanobis
 from stonesoup.models.measurement.nonlinear import CartesianToBearingRange
 from stonesoup.models.transition.linear import CombinedLinearGaussianTransitionModel, ConstantVelocity
+from stonesoup.models.transition.nonlinear import ConstantTurn
 from stonesoup.predictor.kalman import ExtendedKalmanPredictor, UnscentedKalmanPredictor
 from stonesoup.predictor.particle import ParticlePredictor
 from stonesoup.resampler.particle import ESSResampler
@@ -50,9 +51,11 @@ from stonesoup.updater.particle import ParticleUpdater
 from benchmarks.scenes import PERIOD, Scene, formation, given_tracks
 from benchmarks.tracking import Run, peak_mb
 from radar_console.core.messages import TRACK, Table, TrackStatus, blank
-from radar_console.core.units import KM
+from radar_console.core.units import DEG, KM
 
 Q = 1.0  # m²/s³
+TURN_RATE = 3.0 * DEG  # rad/s, deviation of a new track's
+TURN_NOISE = TURN_RATE**2 / 20.0  # rad²/s³, of its random walk: that deviation in 20 s
 P_G, GATE = 0.99, 3.03  # and the Mahalanobis distance that belongs to it
 PARTICLES = 1000
 HITS, MISSES = 4, 6
@@ -78,7 +81,7 @@ def one_step(name: str) -> Callable[[], Any]:
     """The prediction and update of one object by the EKF, the UKF or the PF."""
     scene = formation(1, seed=1, scans=2)
     parts = parts_of(scene, f"{name} + GNN")
-    prior = _state(given_tracks(scene, 1)[0], parts.particles)
+    prior = _state(given_tracks(scene, 1)[0], parts)
     now, detection = _time(PERIOD), next(iter(next(_detections(scene, parts.model))[1]))
 
     def step() -> None:
@@ -89,15 +92,26 @@ def one_step(name: str) -> Callable[[], Any]:
     return step
 
 
-def parts_of(scene: Scene, name: str) -> Parts:
-    """The components of ``PF + EHM2``, ``EKF + EHM2``, ``UKF + EHM2`` or ``EKF + GNN``."""
+def parts_of(scene: Scene, name: str, q: float = Q) -> Parts:
+    """The components of ``PF + EHM2``, ``EKF + EHM2``, ``UKF + EHM2``, ``EKF turn + EHM2`` or ``EKF + GNN``.
+
+    `q` is the process noise, m²/s³; ``turn`` is a coordinated turn whose rate is part of the state.
+    """
     filter_name, _, association = name.partition(" + ")
     sd = scene.radar.sd_azimuth, scene.radar.sd_range / KM
-    model = CartesianToBearingRange(ndim_state=4, mapping=(0, 2), noise_covar=np.diag(np.square(sd)))
-    motion = CombinedLinearGaussianTransitionModel([ConstantVelocity(Q / KM**2)] * 2)
+    turning = filter_name == "EKF turn"
+    size = 5 if turning else 4
+    model = CartesianToBearingRange(ndim_state=size, mapping=(0, 2), noise_covar=np.diag(np.square(sd)))
+    noise = np.full(2, q / KM**2)
+    motion = (
+        ConstantTurn(noise, TURN_NOISE)
+        if turning
+        else CombinedLinearGaussianTransitionModel([ConstantVelocity(each) for each in noise])
+    )
     extended = ExtendedKalmanPredictor(motion), ExtendedKalmanUpdater(model)
     predictor, updater = {
         "EKF": extended,
+        "EKF turn": extended,
         "UKF": (UnscentedKalmanPredictor(motion), UnscentedKalmanUpdater(model)),
         "PF": (ParticlePredictor(motion), ParticleUpdater(model)),
     }[filter_name]
@@ -111,7 +125,8 @@ def parts_of(scene: Scene, name: str) -> Parts:
         density = scene.clutter * mean_range * KM  # per radian and kilometre
         associator = JPDAWithEHM2(PDAHypothesiser(predictor, updater, density, scene.p_d, P_G))
     spread = (SPEED / 2 / KM) ** 2
-    unknown = GaussianState(np.zeros((4, 1)), np.diag([0.0, spread, 0.0, spread]))
+    spreads = [0.0, spread, 0.0, spread, TURN_RATE**2][:size]
+    unknown = GaussianState(np.zeros((size, 1)), np.diag(spreads))
     initiator = MultiMeasurementInitiator(
         unknown, UpdateTimeStepsDeleter(2), GNNWith2DAssignment(near), extended[1], model, min_points=HITS
     )
@@ -119,14 +134,12 @@ def parts_of(scene: Scene, name: str) -> Parts:
     return Parts(model, predictor, updater, associator, initiator, deleter, filter_name == "PF")
 
 
-def track(scene: Scene, name: str, given: Table | None, seed: int) -> Run:
+def track(scene: Scene, name: str, given: Table | None, seed: int, q: float = Q) -> Run:
     """One of its trackers over a snapshot scene; from scratch, or on from tracks that are given."""
     np.random.seed(seed)  # noqa: NPY002  Stone Soup draws from the global generator
-    parts = parts_of(scene, name)
+    parts = parts_of(scene, name, q)
     tracks = (
-        {Track([_state(row, parts.particles)], id=str(row["track"])) for row in given}
-        if given is not None
-        else set()
+        {Track([_state(row, parts)], id=str(row["track"])) for row in given} if given is not None else set()
     )
     numbers: dict[str, int] = {track.id: int(track.id) for track in tracks}
     rows, cpu, wall, initiation = [_rows(tracks, numbers, 0.0)], [], [], []
@@ -227,13 +240,14 @@ def _detections(scene: Scene, model: Any) -> Iterator[tuple[datetime, set[Any]]]
         )
 
 
-def _state(row: Any, particles: bool) -> Any:
-    """A given track's first state."""
+def _state(row: Any, parts: Parts) -> Any:
+    """A given track's first state; it says nothing of a turn."""
     names = ("east", "v_east", "north", "v_north")
-    mean = np.array([[row[name] / KM] for name in names])
-    covar = np.diag([(row["sd_" + name] / KM) ** 2 for name in names])
-    state = GaussianState(mean, covar, timestamp=_time(float(row["time"])))
-    return _cloud(state) if particles else state
+    size = parts.model.ndim_state
+    mean = np.array([row[name] / KM for name in names] + [0.0])[:size, None]
+    variance = [(row["sd_" + name] / KM) ** 2 for name in names] + [TURN_RATE**2]
+    state = GaussianState(mean, np.diag(variance[:size]), timestamp=_time(float(row["time"])))
+    return _cloud(state) if parts.particles else state
 
 
 def _cloud(state: Any) -> Any:

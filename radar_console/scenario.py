@@ -279,7 +279,7 @@ class TrackerSettings(Settings):
         Field(
             max_length=4,
             description="motion models: constant velocity, constant acceleration, coordinated turn, "
-            "Singer's; several for particle and imm; without it cv, and for imm cv and ct",
+            "Singer's; several for particle and imm; without it cv, and for imm cv, ca and ct",
         ),
     ] = ()
     proposal: Annotated[
@@ -310,11 +310,11 @@ class TrackerSettings(Settings):
     manoeuvre_mps2: Annotated[Positive, Field(description="rms acceleration of a manoeuvre")] = 15.0
     manoeuvre_s: Annotated[
         Positive, Field(description="how long a manoeuvre lasts; time constant of Singer's model")
-    ] = 20.0
+    ] = 10.0
     straight_s: Annotated[
         Positive, Field(description="how long straight flight lasts between manoeuvres")
-    ] = 120.0
-    turn_rate_dps: Annotated[Positive, Field(description="rms rate of a turn")] = 3.0
+    ] = 30.0
+    turn_rate_dps: Annotated[Positive, Field(description="rms rate of a turn")] = 6.0
     max_tracks: Annotated[
         Count, Field(description="capacity, young tracks included; the least likely young ones go first")
     ] = 50_000

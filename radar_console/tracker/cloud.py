@@ -32,7 +32,6 @@ _Z_U, _Z_V = particle.Z_U, particle.Z_V
 # Added to the pass: random keys of what else happens in it.
 _UPDATE, _PARTING, _START = 1 << 40, 1 << 42, 1 << 41
 _KERNEL = 0.25
-_WIDER = 3.0  # velocities at confirmation: so young an estimate errs more than its covariance says
 _NEARLY = 0.999  # of the velocity's variance is left open at the start: what is drawn is no singular cloud
 _SD_DOPPLER = 2.0  # m/s, where a plot does not say
 _LEAST_GROWTH = 1e-3  # of that by white acceleration
@@ -55,8 +54,6 @@ def start(track: Any, sensor_e: float, sensor_n: float, par: Any, belief: Belief
     P, L = np.empty((4, 4)), np.empty((4, 4))
     for i in range(4):
         track.anchor[i] = x[i]
-        for j in range(4):
-            track.P[i, j] *= (_WIDER if i > 1 else 1.0) * (_WIDER if j > 1 else 1.0)
     _turn(track.P, track.cos, track.sin, P)
     S[:] = 0.0
     if par.proposal == ADAPTED:
@@ -206,8 +203,11 @@ def update(
         if effective < par.resample_below * weights.size:
             _resample_cloud(track, key, par, belief)
     else:
+        effective = _effective(terms, everything) if par.proposal == ADAPTED else math.inf
         _propose_cloud(track, terms, everything, chosen, pool, key, par, belief)
         _take_moments(track, par, belief)
+        if effective < par.resample_below * weights.size:
+            _part_copies(track, key, belief)
 
 
 @njit(cache=True, nogil=True, error_model="numpy", fastmath={"reassoc", "contract", "nsz"})
@@ -228,6 +228,20 @@ def _pair_weights(
     return everything
 
 
+@njit(cache=True, nogil=True, error_model="numpy", fastmath={"reassoc", "contract", "nsz"})
+def _effective(terms: Singles, everything: float) -> float:
+    """Effective number of the particles, by their weights over all alternatives; the sum is `everything`."""
+    together = terms[0].copy()
+    for row in range(1, terms.shape[0]):
+        term = terms[row]
+        for i in range(together.size):
+            together[i] += term[i]
+    squares = 0.0
+    for i in range(together.size):
+        squares += together[i] * together[i]
+    return everything * everything / squares
+
+
 @njit(cache=True, nogil=True, error_model="numpy")
 def _sum_alternatives(terms: Singles, weights: Singles) -> None:
     weights[:] = terms[0]
@@ -239,18 +253,30 @@ def _sum_alternatives(terms: Singles, weights: Singles) -> None:
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def _resample_cloud(track: Any, key: Any, par: Any, belief: Belief) -> None:
-    """Resample by the scheme of the settings, and part the copies by a kernel."""
+    """Resample by the scheme of the settings, and part the copies."""
     particles, weights = belief.particles[track.slot], belief.weights[track.slot]
     model, count = belief.model[track.slot], weights.size
     ancestors, scratch = np.empty(count, np.int32), np.empty(particles.shape, np.float32)
-    cov = np.empty((4, 4))
     _resample(par.resampling, weights, key, ancestors)
     _gather(particles, ancestors, scratch)
     particles[:] = scratch
     model[:] = model[ancestors]
     weights[:] = np.float32(1.0 / count)
+    _part_copies(track, key, belief)
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _part_copies(track: Any, key: Any, belief: Belief) -> None:
+    """Part the copies of particles by a kernel, whose shape is the cloud's own covariance, P less S."""
+    particles, S = belief.particles[track.slot], belief.P[track.slot, 0]
+    cov, scratch = np.empty((4, 4)), np.empty((4, particles.shape[1]), np.float32)
     _turn(track.P, track.cos, track.sin, cov)
-    _regularise(particles, cov, _KERNEL, _mix(key), belief.table, scratch[:4])
+    for axis in range(2):
+        cov[axis, axis] -= S[0, 0]
+        cov[axis, 2 + axis] -= S[0, 1]
+        cov[2 + axis, axis] -= S[0, 1]
+        cov[2 + axis, 2 + axis] -= S[1, 1]
+    _regularise(particles, cov, _KERNEL, _mix(key + np.uint64(5)), belief.table, scratch)
 
 
 @njit(cache=True, nogil=True, error_model="numpy")

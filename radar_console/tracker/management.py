@@ -7,6 +7,7 @@ import numpy as np
 from numba import njit
 
 from radar_console.core.messages import TrackStatus
+from radar_console.estimation.gaussian import Array
 from radar_console.tracker import clutter, filters, gating, height, identity
 from radar_console.tracker.records import (
     AUTO,
@@ -22,6 +23,7 @@ from radar_console.tracker.records import (
     N_ROWS,
     N_SLOTS,
     N_TRACKS,
+    PARTICLE,
     SCORE,
     STARTER,
     TENTATIVE,
@@ -40,6 +42,7 @@ _DROP = 4.6  # of the score from its peak, after which a young track is given up
 _DENSER = math.log(10.0)  # what dense clutter adds to the score that confirms
 _DOUBT = 0.1  # and more for each pass: what an error of the density by a tenth adds to a false score
 _LEAST_HITS = 3
+_WIDER = 3.0  # velocities at confirmation: so young an estimate errs more than its covariance says
 _TENTATIVE, _CONFIRMED = int(TrackStatus.TENTATIVE), int(TrackStatus.CONFIRMED)
 _COASTING, _DELETED = int(TrackStatus.COASTING), int(TrackStatus.DELETED)
 
@@ -180,8 +183,18 @@ def confirm(index: int, plot: Any, beam: Any, w: World) -> None:
     w.belief.owner[track.slot] = index
     size[N_SLOTS] += 1
     report(track, _CONFIRMED, True, True, plot, track.probability, False, track.t, w.par, w.books)
+    if w.par.filter == PARTICLE:
+        _widen(track.P)
     _start_belief(track, beam.e, beam.n, w.par, w.belief)
     w.books.tally[C_CONFIRMED] += 1
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _widen(P: Array) -> None:
+    """Let the velocities of P (4, 4) err `_WIDER` times as much."""
+    for i in range(4):
+        for j in range(4):
+            P[i, j] *= (_WIDER if i > 1 else 1.0) * (_WIDER if j > 1 else 1.0)
 
 
 @njit(cache=True, nogil=True, error_model="numpy")

@@ -373,7 +373,7 @@ def _parameters(settings: TrackerSettings, radar: Radar, seed: int) -> NDArray[n
     """The settings as the compiled sweep reads them, in SI."""
     par = np.zeros(1, PARAMETERS)
     density = settings.clutter_per_km2
-    models = settings.models or (("cv", "ct") if settings.filter == "imm" else ("cv",))
+    models = settings.models or (("cv", "ca", "ct") if settings.filter == "imm" else ("cv",))
     switching = len(models) > 1
     values = {
         "seed": seed,

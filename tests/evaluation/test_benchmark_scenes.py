@@ -255,3 +255,21 @@ def test_a_tracker_that_cannot_adopt_is_skipped(monkeypatch):
     monkeypatch.setattr(tracking, "Tracker", Recorder)
     assert tracking.track(scene, {}, scenes.given_tracks(scene, 1), 1, 1) is None
     assert tracking.track(scene, {}, None, 1, 1) is not None
+
+
+def test_turns_are_at_three_g():
+    """Between scans a velocity changes by 3 g at most; the speed of a piece is exact."""
+    _, velocity = truth_at(scenes.turns(seed=1))
+    assert np.linalg.norm(velocity, axis=2) == pytest.approx(250.0)
+    change = np.linalg.norm(np.diff(velocity, axis=0), axis=2)
+    chord = 2 * 250.0 * np.sin(3 * scenes.G / 250.0 * scenes.PERIOD / 2)
+    assert change.max() == pytest.approx(chord)
+
+
+def test_sprints_go_between_three_speeds():
+    """Where two scans in a row have one speed, no acceleration was going on."""
+    _, velocity = truth_at(scenes.sprints(seed=1))
+    speed = np.linalg.norm(velocity, axis=2)
+    assert np.abs(np.diff(speed, axis=0)).max() == pytest.approx(15.0 * scenes.PERIOD)
+    steady = speed[1:][np.isclose(np.diff(speed, axis=0), 0.0)]
+    assert set(np.round(steady).tolist()) == {100.0, 250.0, 400.0}

@@ -29,12 +29,10 @@ class Cloud:
         self.tracks = np.zeros(tracks, STATE)
 
     def start(self, x, P, i=0, t=0.0):
-        """Begin track `i` at the Gaussian (x, P) itself: a confirmed track's would be widened."""
+        """Begin track `i` at the Gaussian (x, P)."""
         track = self.tracks[i]
         track["id"], track["slot"], track["t"], track["passes"] = i, i, t, 1
-        track["x"] = x
-        wider = np.array([1.0, 1.0, 3.0, 3.0])
-        track["P"] = P / np.outer(wider, wider)
+        track["x"], track["P"] = x, P
         cloud.start(track, 0.0, 0.0, self.par, self.belief)
 
     def advance(self, t, i=0):
