@@ -43,13 +43,13 @@ format: $(READY) ## Rewrite the code in the house's format
 	@$(PYTHON) -m ruff format .
 
 # The rest of benchmarks/ is what these share.
-BENCHMARKS = $(filter-out __init__ acceptance report scenes stone_soup tracking peers, \
+BENCHMARKS = $(filter-out __init__ acceptance report scenes stone_soup tracking peers manoeuvres, \
              $(basename $(notdir $(wildcard benchmarks/*.py))))
 
 bench: $(COMPILED) ## Measure everything; ours beside others where those are installed
 	@set -e; export QT_QPA_PLATFORM=offscreen; \
 	for name in $(BENCHMARKS); do echo "== benchmarks/$$name.py"; $(PYTHON) -m benchmarks.$$name; done; \
-	for name in tracking peers; do \
+	for name in tracking peers manoeuvres; do \
 	    echo "== benchmarks/$$name.py"; $(PYTHON) -m benchmarks.$$name --markdown docs/performance.md; done; \
 	echo "== benchmarks/acceptance.py scenario twenty-five"; \
 	$(PYTHON) -m benchmarks.acceptance scenario twenty-five

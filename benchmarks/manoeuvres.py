@@ -43,7 +43,7 @@ OURS = dict(
 # Trackers of `benchmarks/stone_soup.py`, and their process noise.
 PEERS = {
     f"Stone Soup, {name}, q {q:g}": (f"{name} + EHM2", q)
-    for name, q in (("EKF", 1.0), ("EKF", 30.0), ("EKF", 300.0), ("EKF turn", 30.0))
+    for name, q in (("EKF", 1.0), ("EKF", 300.0), ("EKF", 3000.0), ("EKF turn", 300.0))
 }
 SLOW = "swarm"  # Stone Soup needs ten seconds to minutes for each of its scans
 

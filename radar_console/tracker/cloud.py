@@ -32,6 +32,7 @@ _Z_U, _Z_V = particle.Z_U, particle.Z_V
 # Added to the pass: random keys of what else happens in it.
 _UPDATE, _PARTING, _START = 1 << 40, 1 << 42, 1 << 41
 _KERNEL = 0.25
+_FLAT = 1e-4  # of the product of the variances: a determinant below it is rounding's
 _NEARLY = 0.999  # of the velocity's variance is left open at the start: what is drawn is no singular cloud
 _SD_DOPPLER = 2.0  # m/s, where a plot does not say
 _LEAST_GROWTH = 1e-3  # of that by white acceleration
@@ -276,6 +277,10 @@ def _part_copies(track: Any, key: Any, belief: Belief) -> None:
         cov[axis, 2 + axis] -= S[0, 1]
         cov[2 + axis, axis] -= S[0, 1]
         cov[2 + axis, 2 + axis] -= S[1, 1]
+        # A cloud that rounding leaves without a spread of its own has no shape to part its copies by.
+        shape = cov[axis, axis] * cov[2 + axis, 2 + axis] - cov[axis, 2 + axis] ** 2
+        if not (cov[axis, axis] > 0.0 and shape > _FLAT * track.P[axis, axis] * track.P[2 + axis, 2 + axis]):
+            return
     _regularise(particles, cov, _KERNEL, _mix(key + np.uint64(5)), belief.table, scratch)
 
 

@@ -24,7 +24,7 @@ FILTERS = {
     "kalman ct": {"filter": "kalman", "models": ("ct",)},
     "extended ct": {"filter": "extended", "models": ("ct",)},
     "unscented ct": {"filter": "unscented", "models": ("ct",)},
-    "imm cv ct": {"filter": "imm"},
+    "imm cv ct": {"filter": "imm", "models": ("cv", "ct")},
     "imm cv ca": {"filter": "imm", "models": ("cv", "ca")},
     "imm ca singer": {"filter": "imm", "models": ("ca", "singer")},
     "imm all": {"filter": "imm", "models": ("cv", "ca", "ct", "singer")},

@@ -424,3 +424,20 @@ def test_log_density_of_the_gate_and_the_cloud_agree():
     z = prior.mean[:2] + np.array([[0.0, 0.0], [100.0, 50.0], [-150.0, 100.0]])
     expected = log_density(z - prior.mean[:2], prior.cov[:2, :2] + R)
     assert np.allclose(c.weigh(plots(T, z, R))[0], expected, rtol=0, atol=0.03)
+
+
+def test_copies_are_parted_and_moments_stay():
+    """A plot 3 sigma out leaves few particles effective. The kernel draws anew what it takes from the
+    spread: traces agree to 4.5 standard errors of 20,000 draws, √(2 / N) of a variance each."""
+    clouds = []
+    for below in (0.0, 1.0):
+        c = Cloud(20_000, process_noise_m2ps3=Q_WHITE, resample_below=below)
+        c.start(X, P)
+        c.step(T, plots(T, predicted().mean[:2] + 3.0 * np.sqrt(np.diag(R)), R))
+        particles, S = c.belief.particles[0].astype(float), c.belief.P[0, 0]
+        for axis, variance in ((0, S[0, 0]), (2, S[1, 1])):
+            spread = particles[axis : axis + 2].var(axis=1).sum() + 2.0 * variance
+            expected = c.tracks[0]["P"][axis, axis] + c.tracks[0]["P"][axis + 1, axis + 1]
+            assert spread == pytest.approx(expected, rel=4.5 * math.sqrt(2.0 / 20_000))
+        clouds.append(particles)
+    assert not np.array_equal(*clouds)
