@@ -34,11 +34,12 @@ def options_of(opened: Opened, user_map: Path | None) -> Options:
     """How the console starts on this source."""
     display, radar = opened.settings.display, opened.source.radar
     tracker = opened.settings.tracker
+    particles = f" {tracker.particles}" if tracker.filter == "particle" else ""
     subtitle = f"{opened.kind} · seed {opened.seed}" if opened.kind == "simulation" else opened.kind
     return Options(
         title=opened.title,
         subtitle=f"{subtitle} · {radar.name} · north up",
-        tracker_name=f"{tracker.filter} {tracker.particles} · {tracker.associator.upper()}",
+        tracker_name=f"{tracker.filter}{particles} · {tracker.associator.upper()}",
         range_m=display.range_km * KM if display.range_km else radar.max_range,
         afterglow_s=radar.rotation if display.afterglow_s is None else display.afterglow_s,
         trail_s=display.trail_s,

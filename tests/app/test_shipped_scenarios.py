@@ -1,5 +1,6 @@
 """Every scenario that comes along, tracked for its first turns, without a window and without a clock."""
 
+from dataclasses import replace
 from itertools import takewhile
 from pathlib import Path
 
@@ -7,6 +8,7 @@ import numpy as np
 import pytest
 
 from radar_console.app.chain import Chain
+from radar_console.app.console import options_of
 from radar_console.app.opening import open_source, scenarios
 from radar_console.core.messages import Table, TrackStatus
 
@@ -64,3 +66,13 @@ def test_the_first_turns(file: Path) -> None:
     least, most_alone = EXPECTED[file.stem]
     assert found >= least
     assert alone <= most_alone
+
+
+@pytest.mark.parametrize(
+    ("filter", "says"), [("particle", "particle 1000 · GNN"), ("kalman", "kalman · GNN")]
+)
+def test_the_status_bar_names_the_tracker(filter, says):
+    opened = open_source("twenty-five")
+    tracker = opened.settings.tracker.model_copy(update={"filter": filter, "associator": "gnn"})
+    settings = opened.settings.model_copy(update={"tracker": tracker})
+    assert options_of(replace(opened, settings=settings), None).tracker_name == says
