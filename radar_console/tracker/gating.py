@@ -71,31 +71,32 @@ def extent(
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def look(track: Any, wake: Any, beam: Any, par: Any) -> None:
-    """Set the track's beam phase, its gate's extent, and until when it can sleep: `wake` (2,)."""
+def look(track: Any, beam: Any, par: Any) -> tuple[float, float]:
+    """Set the track's beam phase and its gate's extent; until which beam angle and time it can sleep."""
     T = max(beam.t - track.t, 0.0)
     e, n, ee, en, nn = predicted(track, T)
     de, dn = e - beam.e, n - beam.n
     track.rho = beam.phi - track.psi - _TURN - wrap(math.atan2(de, dn) - track.psi)
-    gamma = 2.0 * par.gate if par.rectangle else par.gate  # of the ellipse around the rectangle
-    h, along = extent(de, dn, ee, en, nn, track.sd_range, track.sd_azimuth, gamma)
-    r = math.hypot(de, dn)
+    r = math.sqrt(de * de + dn * dn)
     if track.level == STARTER:
+        # Where a target can have got to; the ellipse of its unknown velocity reaches farther.
         noise = track.sd_range * track.sd_range + (r * track.sd_azimuth) ** 2
         reach = start_reach(track, T, noise, par)
-        if reach < r:
-            h = min(h, math.asin(reach / r))
-            along = min(along, reach)
+        h, along = (math.asin(reach / r), reach) if reach < r else (math.pi, math.inf)
+    else:
+        gamma = 2.0 * par.gate if par.rectangle else par.gate  # of the ellipse around the rectangle
+        h, along = extent(de, dn, ee, en, nn, track.sd_range, track.sd_azimuth, gamma)
     track.half_width, track.along = h, along
     ahead = -h - MARGIN - track.rho
     if ahead <= 0.0 or h == math.pi or track.claims:
-        wake[0] = wake[1] = -math.inf
-        return
-    # A fifth of what is ahead is left to the target's motion, and to the growth of its gate.
+        return -math.inf, -math.inf
+    # Until the beam is there the target moves on, and its gate grows, by `speed` at the most. Twice the
+    # angle of that, over the time that the beam should take, is left to it; if it takes longer, the
+    # track wakes by time. Of the way ahead at least half goes by in sleep.
     x, P = track.x, track.P
-    speed = math.hypot(x[2], x[3]) + 10.0 * math.sqrt(P[2, 2] + P[3, 3]) + par.max_speed
-    wake[0] = beam.phi + 0.8 * ahead
-    wake[1] = beam.t + min(0.1 * ahead, 0.5) * r / speed
+    speed = math.sqrt(x[2] * x[2] + x[3] * x[3]) + 10.0 * math.sqrt(P[2, 2] + P[3, 3]) + par.max_speed
+    sleep = min(1.25 * par.turn * ahead / _TURN, min(0.25 * ahead, 0.5) * r / speed)
+    return beam.phi + ahead - 2.0 * speed * sleep / r, beam.t + sleep
 
 
 @njit(cache=True, nogil=True, error_model="numpy")

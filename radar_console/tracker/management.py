@@ -8,7 +8,7 @@ from numba import njit
 
 from radar_console.core.messages import TrackStatus
 from radar_console.estimation.gaussian import Array
-from radar_console.tracker import clutter, filters, gating, height, identity
+from radar_console.tracker import clutter, filters, gating, height, identity, order
 from radar_console.tracker.records import (
     AUTO,
     BRANCHING,
@@ -33,7 +33,7 @@ from radar_console.tracker.records import (
 )
 
 _wrap, _too_fast, _start_belief, _predicted = gating.wrap, gating.too_fast, filters.start, gating.predicted
-_gather = clutter.gather
+_gather, _ascending = clutter.gather, order.ascending
 _height, _begin_height, _learn = height.predicted, height.begin, identity.learn
 _TURN = 2.0 * math.pi
 FIRST_SCORE = math.log(0.1 / 0.9)  # one plot in ten is a new target's
@@ -296,7 +296,8 @@ def bury(w: World) -> None:
     left = size[N_TRACKS] - dead.size
     moved = np.full(dead.size, -1, np.int64)  # where the tracks behind `left` go
     mover = size[N_TRACKS] - 1
-    for index in np.sort(dead):
+    for k in _ascending(dead):
+        index = dead[k]
         if index >= left:
             break
         while tracks[mover].dead:

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numba import njit
 
-from radar_console.tracker import clusters, clutter, gating, management, youth
+from radar_console.tracker import clusters, clutter, gating, management, order, youth
 from radar_console.tracker.records import (
     N_EDGES,
     N_MEMBERS,
@@ -38,6 +38,7 @@ _serve_members, _settle_young, _retire, _purge = (
 )
 _bury, _turn_to = management.bury, clutter.turn_to
 _survey, _forget = clutter.survey, clutter.forget
+_ascending = order.ascending
 
 _OPENED = 1
 
@@ -98,12 +99,12 @@ def close_bin(beam: Any, w: World, final: bool) -> None:
 @njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
 def _find_open(beam: Any, w: World) -> None:
     """List the tracks whose gates the beam has reached and that were not served since."""
-    n = 0
+    n, wake = 0, w.books.wake
     for i in range(w.books.size[N_TRACKS]):
-        if beam.phi < w.books.wake[i, 0] and beam.t < w.books.wake[i, 1]:
+        if beam.phi < wake[i, 0] and beam.t < wake[i, 1]:
             continue
         track = w.tracks[i]
-        _look(track, w.books.wake[i], beam, w.par)
+        wake[i, 0], wake[i, 1] = _look(track, beam, w.par)
         if track.claims or track.rho >= -track.half_width - _MARGIN:
             track.place, track.first = n, -1
             w.opened[n] = i
@@ -127,8 +128,8 @@ def _gate(beam: Any, queue: Any, w: World) -> bool:
     for k in range(n):
         distance[k] = math.hypot(fresh[k].e - beam.e, fresh[k].n - beam.n)
         lag = max(lag, abs(beam.t - fresh[k].t))
-    order = np.argsort(distance, kind="mergesort")
-    distance = distance[order]
+    by_range = _ascending(distance)
+    distance = distance[by_range]
     first, count = size[N_POOL], size[N_EDGES]
     for place in range(opened):
         index = w.opened[place]
@@ -141,7 +142,7 @@ def _gate(beam: Any, queue: Any, w: World) -> bool:
         r, along = math.hypot(e, north), track.along + _drift(track, lag)
         i = np.searchsorted(distance, r - along)
         while i < n and distance[i] <= r + along:
-            plot = fresh[order[i]]
+            plot = fresh[by_range[i]]
             i += 1
             phase = track.rho - (beam.phi - plot.phi)
             if not -math.pi <= phase <= math.pi:
@@ -150,7 +151,7 @@ def _gate(beam: Any, queue: Any, w: World) -> bool:
             if likelihood > 0.0:
                 if count < edges.size:
                     edge = edges[count]
-                    edge.track, edge.plot, edge.density = index, first + order[i - 1], likelihood
+                    edge.track, edge.plot, edge.density = index, first + by_range[i - 1], likelihood
                     edge.spent = False
                 count += 1
                 track.claims = True

@@ -16,7 +16,7 @@ from numba import njit
 from radar_console.core.messages import TrackStatus
 from radar_console.estimation import particle
 from radar_console.estimation.kalman import predict_in_place, update_in_place
-from radar_console.tracker import clusters, clutter, gating, height, management
+from radar_console.tracker import clusters, clutter, gating, height, management, order
 from radar_console.tracker.records import (
     AUTO,
     BRANCHING,
@@ -40,7 +40,7 @@ _density_of, _MARGIN = gating.density_of, gating.MARGIN
 _density_at, _doubted = clutter.density_at, clutter.doubted
 _evidence, _update_height = clusters.evidence, height.update
 _serve, _begin, _kill, _report = management.serve, management.begin, management.kill, management.report
-_confirm = management.confirm
+_confirm, _ascending = management.confirm, order.ascending
 _DELETED = int(TrackStatus.DELETED)
 _PRUNE = 1e-3  # of the miss: a pair that is less likely is no pair
 _NOBODY, _HELD = -2, -3  # marks of a plot: no track waits for it; some do
@@ -295,7 +295,9 @@ def _keep_best(ends: Any, w: World) -> None:
         if not track.dead and track.hits > 2:
             score[n], index[n] = -track.score, i
             n += 1
-    for k in np.argsort(score[:n], kind="mergesort")[_MOST_ENDS:]:
+    if n <= _MOST_ENDS:
+        return
+    for k in _ascending(score[:n])[_MOST_ENDS:]:
         track = w.tracks[index[k]]
         if track.voiced:
             _report(track, _DELETED, False, False, w.pool[0], math.nan, False, track.t, w.par, w.books)
