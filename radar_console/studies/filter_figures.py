@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
-from matplotlib.ticker import FixedLocator, NullLocator, ScalarFormatter
+from matplotlib.ticker import FixedLocator, NullLocator
 
 from radar_console.evaluation.intervals import Interval
 from radar_console.studies import trajectories
@@ -38,18 +38,18 @@ def curve(work: Work, scores: Sequence["Score"], ekf: float, pf: float) -> None:
         ax.yaxis.set_major_locator(FixedLocator([100, 120, 150, 200, 300, 400, 600]))
         ax.yaxis.set_minor_locator(NullLocator())
         for axis in (ax.xaxis, ax.yaxis):
-            axis.set_major_formatter(ScalarFormatter())
-        ax.set(xlabel="process noise σ_a of the Kalman filter, m/s²", ylabel="RMSE, m")
+            axis.set_major_formatter("{x:g}")
+        ax.set(xlabel=r"process noise $\sigma_a$ of the Kalman filter, m/s²", ylabel="RMSE, m")
         ax.set_title("A Kalman filter alone gives both published figures")
         ax.legend(loc="upper right")
 
 
 def ratios(work: Work, scores: Sequence["Score"], published: float) -> None:
     """IMM and RBPF over the Kalman filter, by case, with 95 % intervals."""
-    with figure(work, "filter-rmse-ratios", 2, size=(8.6, 4.6), sharey=True) as (_, axes):
+    with figure(work, "filter-rmse-ratios", 2, size=(8.6, 4.8), sharey=True) as (drawn, axes):
         rows = np.arange(len(scores))[::-1]
         for ax, opponent, title in zip(
-            axes, ("kf", "nominal"), ("over the best-tuned KF", "over the nominal KF, σ_a = 3"), strict=True
+            axes, ("kf", "nominal"), ("Over the best-tuned KF", r"Over the nominal KF, $\sigma_a$ = 3 m/s²"), strict=True
         ):
             for name, dy in (("imm", 0.13), ("rbpf", -0.13)):
                 each = [score.ratio[name, opponent] for score in scores]
@@ -62,7 +62,7 @@ def ratios(work: Work, scores: Sequence["Score"], published: float) -> None:
                 )
             ax.axvline(published, color=INK, lw=1.0, ls=(0, (5, 3)), zorder=1)
             ax.axvline(1.0, color=GREY, lw=1.0)
-            ax.set(xlabel="RMSE ratio", title=title, xlim=(0.3, 1.05))
+            ax.set(xlabel="RMSE ratio", title=title, xlim=(0.25, 1.05))
             ax.grid(axis="y", visible=False)
         axes[0].set_yticks(rows, [score.case.name for score in scores])
         axes[0].tick_params(axis="y", length=0)
@@ -70,7 +70,7 @@ def ratios(work: Work, scores: Sequence["Score"], published: float) -> None:
             published - 0.01, rows[0] + 0.62, "published 0.726", ha="right", va="center", fontsize=8.5
         )
         axes[0].set_ylim(-0.6, len(scores) - 0.1)
-        axes[1].legend(loc="lower right")
+        drawn.legend(*axes[1].get_legend_handles_labels(), loc="outside lower center", ncols=2)
 
 
 def flight(work: Work, score: "Score", runs: int) -> None:
@@ -95,7 +95,7 @@ def flight(work: Work, score: "Score", runs: int) -> None:
             right.plot(time, np.sqrt(score.time[name] / runs), color=colour, label=label, lw=width)
         right.axhline(float(score.rmse["raw"].value), color=INK, lw=1.0, ls=(0, (1, 2)))
         right.set(xlabel="time, s (shaded: manoeuvres)", ylabel="RMSE, m", xlim=(0, begin), ylim=(0, None))
-        right.set_title(f"error along it, {runs} runs; dotted: no filter")
+        right.set_title(f"Error along it, {runs} runs (dotted: no filter)")
         right.legend(loc="upper right", ncols=3, columnspacing=1.2)
 
 

@@ -14,7 +14,7 @@ from the prior and resamples at every scan. All schemes get the same truths, mea
 - scatter: how far resampling moves the cloud's mean, rms, over its own standard deviation and times √N. It is
   what a scheme adds to the error; 0 is perfect, and multinomial sampling has 1.
 
-Running time: 200 runs take about two minutes on one core.
+Running time: 100 runs take about two minutes on one core.
 """
 
 import numpy as np
@@ -30,7 +30,7 @@ from radar_console.studies.filter_runs import Measured
 from radar_console.studies.findings import Finding, found
 from radar_console.studies.work import Arrays, Part, Work, chunks, generator
 
-RUNS = 200
+RUNS = 100
 COUNTS = (100, 300, 1_000, 3_000, 10_000)
 _SCANS, _T, _SIGMA, _SD = 40, 4.0, 3.0, 100.0
 _CHUNK = 25  # runs of a part
@@ -85,7 +85,6 @@ def filter_with(scheme: str, count: int, runs: range, seed: int) -> Arrays:
         before = _spread(cloud)
         filtered.append(before.mean)
         effective.append(samples.effective_size(cloud) / count)
-        # Positions are drawn from a continuous density: equal ones are copies.
         cloud = samples.resample(cloud, rng, RESAMPLING[scheme], below=np.inf)
         survivors.append(_distinct(cloud.states[..., 0]) / count)
         moved = cloud.states[..., :2].mean(axis=0) - before.mean
@@ -124,10 +123,9 @@ def _spread(cloud: samples.Samples) -> Gaussian:
     return samples.estimate(samples.Samples(cloud.states[..., :2], cloud.log_weights))
 
 
-def _distinct(values: Array) -> Array:
-    """How many different values there are along the first axis."""
-    ordered = np.sort(values, axis=0)
-    count: Array = 1.0 + np.count_nonzero(np.diff(ordered, axis=0), axis=0)
+def _distinct(east: Array) -> Array:
+    """How many particles (N, ...) are no copy of another: copies stand together, and others differ."""
+    count: Array = 1.0 + np.count_nonzero(np.diff(east, axis=0), axis=0)
     return count
 
 
@@ -164,9 +162,9 @@ def draw(work: Work, ratio: _Ratios, mean: dict[str, _Ratios]) -> None:
     """Accuracy, N_eff and scatter against the number of particles."""
     with figure(work, "resampling", 3, size=(9.6, 3.8)) as (drawn, axes):
         panels = (
-            (ratio, "RMSE above the KF's, %", "accuracy"),
-            (mean["effective"], "N_eff / N before resampling", "weights"),
-            (mean["scatter"], "√N · shift of mean / deviation", "what resampling adds"),
+            (ratio, "RMSE above the KF's, %", "Accuracy"),
+            (mean["effective"], r"$N_\mathrm{eff}$ / N before resampling", "Weights"),
+            (mean["scatter"], "√N · shift of the mean / its deviation", "What resampling adds"),
         )
         for ax, (figures, label, title) in zip(axes, panels, strict=True):
             for number, scheme in enumerate(RESAMPLING):

@@ -1,9 +1,9 @@
 """The work of a study: parts that any number of workers share, each kept as it is finished.
 
 A part is a function of this package and its arguments, and gives named arrays. It is kept in the study's
-folder under a digest of function, arguments and source: after a kill the same command goes
-on where it was, and after a change of the code that it uses a part is done anew. What a part draws depends on its
-arguments only, so one worker finds what ten do.
+folder under a digest of function, arguments and source: after a kill the same command goes on where it was,
+and after a change of the code that it uses a part is done anew. What a part draws depends on its arguments
+only, so one worker finds what ten do.
 """
 
 import hashlib
@@ -117,6 +117,7 @@ def _source(module: str) -> str:
     """A digest of the code of a module and of what it uses of this package, directly or not."""
     used: set[str] = set()
     _collect(module, used)
+    used.discard(__name__)  # how work is shared out changes no result
     every = hashlib.sha256()
     for name in sorted(used):
         every.update(Path(str(sys.modules[name].__file__)).read_bytes())
