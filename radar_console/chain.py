@@ -122,11 +122,15 @@ class Tally:
 class Chain:
     """A source with its stages, ready to run once.
 
-    `tracker_threads` is how many threads the tracker may use; the same tracks with any number.
+    Attributes
+    ----------
+    tracker_threads : how many threads the tracker may use; the same tracks with any number
+    clock : what the tracker's time is taken with, s
     """
 
     opened: Opened
     tracker_threads: int | None = None
+    clock: Callable[[], float] = time.perf_counter
     tally: Tally = field(default_factory=Tally)
     gauge: Gauge = field(default_factory=Gauge)
 
@@ -193,11 +197,11 @@ class Chain:
     def _timed_tracker(self, sectors: Iterable[Sector]) -> Iterator[Sector]:
         """The tracker stage, its time added up for each turn of the antenna."""
         for sector in sectors:
-            began = time.perf_counter()
+            began = self.clock()
             done = self.tracker.push(sector)
             # A sector that ends at north, or one without extent there, belongs to the turn before.
             turn = math.ceil(sector.end / TURN - 1e-9) - 1
-            self.tally.tracker_s[turn] += time.perf_counter() - began
+            self.tally.tracker_s[turn] += self.clock() - began
             yield done
         rest = self.tracker.flush()
         if rest is not None:
