@@ -148,7 +148,7 @@ def dask(address: str) -> Workers:
                 client.submit(attempt, run, task.setting, task.seed, pure=False, retries=0): task
                 for task in tasks
             }
-            done = distributed.as_completed(futures, with_results=True, raise_errors=False)
+            done = distributed.as_completed(futures, loop=client.loop, with_results=True, raise_errors=False)
             try:
                 for future, result in done:
                     task = futures.pop(future)

@@ -91,10 +91,10 @@ def test_forgotten_runs_are_done_again(tmp_path):
     ("change", "said"),
     [
         ({"about": ABOUT | {"seed": 2}}, "seed was 1, is 2"),
-        ({"about": ABOUT | {"scenario": {"title": "A", "duration_s": 61}}}, "scenario.duration_s was 60, is 61"),
+        ({"about": ABOUT | {"scenario": {"title": "A", "duration_s": 61}}}, "duration_s was 60, is 61"),
         ({"about": ABOUT | {"gate": 3}}, "gate is given now and was not"),
         ({"about": {"seed": 1}}, "scenario is not given now"),
-        ({"compared": [SETTINGS[0], SETTINGS[1] | {"filter": "ukf"}]}, r"settings\[1\].filter was imm, is ukf"),
+        ({"compared": [SETTINGS[0], SETTINGS[1] | {"filter": "ukf"}]}, "filter was imm, is ukf"),
         ({"compared": SETTINGS[:1]}, "settings were filter=kalman, .* now filter=kalman"),
         ({"metrics": ["x"]}, "metrics were"),
     ],
@@ -103,7 +103,7 @@ def test_another_experiment_is_refused(tmp_path, change, said):
     fill(tmp_path)
     before = (tmp_path / "results.csv").read_bytes()
     with (
-        pytest.raises(InputError, match=f"holds runs of another experiment: {said}"),
+        pytest.raises(InputError, match=f"holds runs of another experiment: .*{said}"),
         opened(tmp_path, **change),
     ):
         pass
