@@ -28,7 +28,7 @@ Statistic = Callable[[Array], Array]
 
 
 class Interval(NamedTuple):
-    """A figure and its bounds, each (...); float arrays without axes where one figure was asked for.
+    """A figure and its bounds, each (...); numbers where one figure was asked for.
 
     Attributes
     ----------
@@ -50,17 +50,20 @@ class Interval(NamedTuple):
 
 def average(values: Array) -> Array:
     """The mean over the runs."""
-    return np.asarray(values.mean(axis=-1))
+    result: Array = values.mean(axis=-1)
+    return result
 
 
 def middle(values: Array) -> Array:
     """The median over the runs."""
-    return np.asarray(np.median(values, axis=-1))
+    result: Array = np.median(values, axis=-1)
+    return result
 
 
 def root_mean_square(values: Array) -> Array:
     """√(mean x²): from the RMSE of runs of the same length, the RMSE over all of them."""
-    return np.asarray(np.sqrt(np.square(values).mean(axis=-1)))
+    result: Array = np.sqrt(np.square(values).mean(axis=-1))
+    return result
 
 
 def mean(values: ArrayLike, level: float = LEVEL) -> Interval:
@@ -103,7 +106,7 @@ def proportion(hits: ArrayLike, runs: int | None = None, level: float = LEVEL) -
     half = scale * z * np.sqrt(p * (1.0 - p) / n + 0.25 * (z / n) ** 2)
     # The bounds of none and of all are 0 and 1, not a rounding beside them.
     low, high = np.where(count == 0, 0.0, centre - half), np.where(count == n, 1.0, centre + half)
-    return Interval(np.asarray(p), low, high, n)
+    return Interval(p, low[()], high[()], n)
 
 
 def paired_difference(
@@ -142,8 +145,8 @@ def paired_ratio(
 
     def ratio(x: Array, y: Array) -> Array:
         over, under = statistic(x), statistic(y)
-        result: Array = np.divide(over, under, out=np.full(np.shape(over), np.nan), where=under != 0.0)
-        return result
+        quotient: Array = np.divide(over, under, out=np.full(np.shape(over), np.nan), where=under != 0.0)[()]
+        return quotient
 
     return bootstrap(ratio, values, against, rng=rng, level=level, resamples=resamples)
 
@@ -179,7 +182,7 @@ def bootstrap(
         raise ValueError(f"samples must be of the same runs, not {[array.shape[-1] for array in arrays]}")
     together = np.broadcast_arrays(*arrays)
     n = together[0].shape[-1]
-    value = np.asarray(statistic(*together)) if n else np.full(together[0].shape[:-1], np.nan)
+    value = statistic(*together) if n else np.full(together[0].shape[:-1], np.nan)
     if n < 2:
         return _unsure(value, n)
     batch = max(_AT_ONCE // max(together[0].size, 1), 1)
@@ -198,5 +201,5 @@ def _runs(values: ArrayLike) -> tuple[Array, int]:
 
 
 def _unsure(value: Array, runs: int) -> Interval:
-    unknown = np.full(np.shape(value), np.nan)
-    return Interval(value, unknown, unknown.copy(), runs)
+    unknown = np.full(np.shape(value), np.nan)[()]
+    return Interval(value[()], unknown, unknown, runs)
