@@ -212,23 +212,27 @@ def _select(weights: Array, count: int, start: float, chosen: Any) -> int:
                 above += 1
             else:
                 below += w
-        new = below / (count - above) if count > above else 0.0
-        if new >= c * (1.0 - 1e-12) or count <= above:
+        if count <= above or below <= 0.0:
+            break
+        new = below / (count - above)
+        if new >= c * (1.0 - 1e-12):
             break
         c = new
-    kept, sum_ = 0, start * c
+    kept, light, sum_ = 0, count - above, start * c
     for i in range(weights.size):
         w = weights[i]
-        if w >= c and w > 0.0:
+        heavy = w >= c
+        if not heavy:
+            sum_ += w
+            # Rounding must not let one light branch more in: there is room for `count`.
+            if sum_ < c or light <= 0:
+                continue
+            sum_ -= c
+            light -= 1
+            weights[i] = c
+        if kept < count:
             chosen[kept] = i
             kept += 1
-        elif w > 0.0:
-            sum_ += w
-            if sum_ >= c and kept < count:
-                sum_ -= c
-                weights[i] = c
-                chosen[kept] = i
-                kept += 1
     return kept
 
 

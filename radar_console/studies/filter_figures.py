@@ -49,7 +49,10 @@ def ratios(work: Work, scores: Sequence["Score"], published: float) -> None:
     with figure(work, "filter-rmse-ratios", 2, size=(8.6, 4.8), sharey=True) as (drawn, axes):
         rows = np.arange(len(scores))[::-1]
         for ax, opponent, title in zip(
-            axes, ("kf", "nominal"), ("Over the best-tuned KF", r"Over the nominal KF, $\sigma_a$ = 3 m/s²"), strict=True
+            axes,
+            ("kf", "nominal"),
+            ("Over the best-tuned KF", r"Over the nominal KF, $\sigma_a$ = 3 m/s²"),
+            strict=True,
         ):
             for name, dy in (("imm", 0.13), ("rbpf", -0.13)):
                 each = [score.ratio[name, opponent] for score in scores]
