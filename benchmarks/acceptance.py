@@ -15,9 +15,9 @@ from typing import Annotated, Literal
 import numpy as np
 import typer
 
-from radar_console.app.chain import Chain
 from radar_console.app.headless import figures_of
-from radar_console.app.opening import Opened, open_source
+from radar_console.app.opening import open_source
+from radar_console.chain import Chain, Opened
 from radar_console.core.messages import TRACK, Table, TrackStatus
 
 app = typer.Typer(

@@ -21,9 +21,9 @@ import numpy as np
 from numpy.typing import NDArray
 from PySide6.QtWidgets import QApplication
 
-from radar_console.app.chain import Chain
 from radar_console.app.console import options_of
 from radar_console.app.opening import open_source
+from radar_console.chain import Chain
 from radar_console.core.messages import Radar, Sector
 from radar_console.display.feed import Feed
 from radar_console.display.options import Options

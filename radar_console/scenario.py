@@ -6,9 +6,9 @@ Units are in the names of the keys. The settings keep those units; whoever uses 
 import difflib
 import json
 import tomllib
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from pathlib import Path
-from typing import Annotated, Any, Literal, Self, TypeVar, get_args
+from typing import Annotated, Any, ClassVar, Literal, Self, TypeVar, get_args
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 from pydantic_core import ErrorDetails, PydanticCustomError
@@ -30,9 +30,18 @@ class Settings(BaseModel):
 
     model_config = ConfigDict(extra="forbid", strict=True, frozen=True)
 
+    alternatives: ClassVar[tuple[tuple[tuple[str, ...], ...], ...]] = ()
+    """Groups of keys of which exactly one is given, and whole; several such choices."""
 
-def _exactly_one(table: Settings, *groups: tuple[str, ...]) -> tuple[str, ...]:
-    """The one group of keys that is given, whole; anything else is an error."""
+    @model_validator(mode="after")
+    def _check_alternatives(self) -> Self:
+        for groups in self.alternatives:
+            _exactly_one(self, *groups)
+        return self
+
+
+def _exactly_one(table: Settings, *groups: tuple[str, ...]) -> None:
+    """Anything but one group of keys, whole, is an error."""
     given = [group for group in groups if any(getattr(table, key) is not None for key in group)]
     choice = " or ".join(" and ".join(group) for group in groups)
     if len(given) != 1:
@@ -40,7 +49,6 @@ def _exactly_one(table: Settings, *groups: tuple[str, ...]) -> tuple[str, ...]:
     missing = [key for key in given[0] if getattr(table, key) is None]
     if missing:
         raise PydanticCustomError("incomplete", "also needs {missing}", {"missing": ", ".join(missing)})
-    return given[0]
 
 
 class Straight(Settings):
@@ -76,6 +84,11 @@ class Target(Settings):
     After its last leg it goes on straight until the end of the scenario, or until `end_s`.
     """
 
+    alternatives = (
+        (("range_km", "azimuth_deg"), ("latitude_deg", "longitude_deg"), ("east_km", "north_km")),
+        (("speed_mps",), ("speed_kmh",), ("speed_kt",)),
+    )
+
     name: str = ""
     range_km: NonNegative | None = None
     azimuth_deg: Bearing | None = None
@@ -100,10 +113,6 @@ class Target(Settings):
 
     @model_validator(mode="after")
     def _check(self) -> Self:
-        _exactly_one(
-            self, ("range_km", "azimuth_deg"), ("latitude_deg", "longitude_deg"), ("east_km", "north_km")
-        )
-        _exactly_one(self, ("speed_mps",), ("speed_kmh",), ("speed_kt",))
         if self.end_s is not None and self.end_s <= self.start_s:
             raise PydanticCustomError("order", "end_s must be greater than start_s")
         if self.climb_mps and self.height_m is None:
@@ -199,6 +208,8 @@ class RadarSettings(Settings):
 class UniformClutter(Settings):
     """False alarms over the whole coverage, Poisson, drawn anew each scan."""
 
+    alternatives = ((("density_per_km2",), ("per_cell",)),)
+
     density_per_km2: NonNegative | None = None
     per_cell: Annotated[NonNegative | None, Field(description="mean number in a range cell × beam width")] = (
         None
@@ -208,11 +219,6 @@ class UniformClutter(Settings):
         Field(description="targets: false targets with returns like a target's; points: single returns"),
     ] = "targets"
 
-    @model_validator(mode="after")
-    def _check(self) -> Self:
-        _exactly_one(self, ("density_per_km2",), ("per_cell",))
-        return self
-
 
 class DiscClutter(Settings):
     """False targets in a disc around every target, Poisson, drawn anew each scan.
@@ -221,14 +227,11 @@ class DiscClutter(Settings):
     over the union of the discs.
     """
 
+    alternatives = ((("mean",), ("density_per_km2",)),)
+
     radius_km: Positive
     mean: NonNegative | None = None
     density_per_km2: NonNegative | None = None
-
-    @model_validator(mode="after")
-    def _check(self) -> Self:
-        _exactly_one(self, ("mean",), ("density_per_km2",))
-        return self
 
 
 class LandClutter(Settings):
@@ -477,10 +480,9 @@ def _problem(model: type[Settings], detail: ErrorDetails) -> tuple[str, str]:
             table = _LEGS[step]  # pydantic names the kind of leg in the path; the user does not
         else:
             path += f".{step}" if path else step
-            table = _table_at(table, step) or table
+            table = table_at(table, step) or table
     if detail["type"] == "extra_forbidden":
-        known = difflib.get_close_matches(str(detail["loc"][-1]), table.model_fields, n=1)
-        return path, f"unknown key, did you mean {known[0]}?" if known else "unknown key"
+        return path, unknown_key(str(detail["loc"][-1]), table.model_fields)
     if detail["type"] == "missing":
         return path, "missing"
     message = detail["msg"][0].lower() + detail["msg"][1:]
@@ -491,7 +493,13 @@ def _problem(model: type[Settings], detail: ErrorDetails) -> tuple[str, str]:
 _LEGS: dict[str, type[Settings]] = {"straight": Straight, "accelerate": Accelerate, "turn": Turn}
 
 
-def _table_at(table: type[Settings], key: str) -> type[Settings] | None:
+def unknown_key(key: str, known: Iterable[str]) -> str:
+    """What is wrong with a key that is none of the known ones, with the one that was likely meant."""
+    near = difflib.get_close_matches(key, known, n=1)
+    return f"unknown key, did you mean {near[0]}?" if near else "unknown key"
+
+
+def table_at(table: type[Settings], key: str) -> type[Settings] | None:
     """The settings class of a key that holds a table or an array of tables."""
     field = table.model_fields.get(key)
     if field is None:

@@ -74,6 +74,11 @@ def test_only_declared_dependencies_are_imported() -> None:
     """What comes along with another package may be gone with its next version."""
     known = packages_distributions()
     allowed = {canonicalize_name(pin.name) for pin in declared(PROJECT["project"]["dependencies"])}
+    # An extra is imported where it is used, which says what to install.
+    allowed |= {
+        canonicalize_name(pin.name)
+        for pin in declared(PROJECT["project"]["optional-dependencies"]["cluster"])
+    }
     # The type checkers' and validators' own cores are installed by, and versioned with, their front.
     allowed |= {"pydantic-core", "shiboken6"}
     package = Path(radar_console.__file__).parent

@@ -270,6 +270,49 @@ def schema() -> None:
     typer.echo(scenario.json_schema(), nl=False)
 
 
+@app.command(
+    epilog="Examples:  radar-console study --list  ·  radar-console study filter-rmse --runs 20  ·  "
+    "radar-console study resampling --jobs 2 -o resampling"
+)
+def study(
+    name: Annotated[
+        str | None, typer.Argument(metavar="NAME", help="Which one; --list names them.", show_default=False)
+    ] = None,
+    listing: Annotated[bool, typer.Option("--list", help="List the studies.")] = False,
+    runs: Annotated[
+        int | None, typer.Option(min=2, metavar="N", help="Runs of each case (default: the study's own).")
+    ] = None,
+    seed: Annotated[int, typer.Option(min=0, metavar="N", help="Of everything that is drawn.")] = 1,
+    jobs: Annotated[
+        int | None,
+        typer.Option(min=1, metavar="N", help="Processes (default: one a core). The results are the same."),
+    ] = None,
+    output: Annotated[
+        Path | None,
+        typer.Option("--output", "-o", metavar="DIR", help="Where its files go (default: out/NAME)."),
+    ] = None,
+) -> None:
+    """Repeat a published experiment: published beside ours, with intervals and figures.
+
+    Finished parts are kept in DIR: after an interruption the same command goes on from there.
+    """
+    from radar_console.app import studying
+
+    if listing:
+        known = studying.listed()
+        width = max(len(each) for each, _ in known)
+        for each, title in known:
+            typer.echo(f"{each:<{width}}  {title}")
+        return
+    if name is None:
+        raise RadarConsoleError("study: which one? Expected a name; `radar-console study --list` has them")
+    with _interruptible(
+        f"finished parts are in {studying.folder_of(name, output)}; the same command goes on from there"
+    ):
+        folder = studying.study(name, runs, seed, jobs, output)
+    typer.echo(f"Table, figures and results.json are in {folder}", err=True)
+
+
 @app.command("warm-up", hidden=True)
 def warm_up() -> None:
     """Compile what is compiled, so that the first start is quick."""

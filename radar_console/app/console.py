@@ -9,10 +9,9 @@ from collections.abc import Iterator
 from contextlib import closing
 from pathlib import Path
 
-from radar_console.app.chain import Chain
 from radar_console.app.headless import brief, check_writable
-from radar_console.app.opening import Opened
 from radar_console.app.status import StatusLine
+from radar_console.chain import Chain, Opened
 from radar_console.core.errors import RadarConsoleError
 from radar_console.core.messages import Sector
 from radar_console.core.units import KM

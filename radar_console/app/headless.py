@@ -10,9 +10,8 @@ from typing import Any
 
 import numpy as np
 
-from radar_console.app.chain import Chain, Tally
-from radar_console.app.opening import Opened
 from radar_console.app.status import StatusLine
+from radar_console.chain import Chain, Opened, Tally
 from radar_console.core.errors import InputError
 from radar_console.core.geometry import Array
 from radar_console.core.messages import TrackStatus

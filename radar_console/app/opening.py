@@ -1,16 +1,11 @@
 """Open whatever the user names: a scenario, a recording, a plot table."""
 
 import difflib
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass
 from pathlib import Path
-from typing import Protocol
 
-import numpy as np
-
-from radar_console import pipeline, scenario
+from radar_console import scenario
+from radar_console.chain import Opened, simulation
 from radar_console.core.errors import InputError
-from radar_console.core.messages import Table
 from radar_console.scenario import Configuration
 
 DEMO = "twenty-five"
@@ -19,39 +14,6 @@ EXPECTED = "expected a scenario (.toml), an ASTERIX recording (.pcap, .ast) or a
 
 AIR_TRAFFIC = {"range_unit": "NM", "speed_unit": "kn", "trail_s": 300.0}
 """How a recorded air-traffic radar is shown unless the configuration says otherwise."""
-
-
-class Source(pipeline.Source, Protocol):
-    """A source that can also say what it holds."""
-
-    @property
-    def noted(self) -> Mapping[str, int]:
-        """What was mended or is worth knowing, counted; nothing of it was lost."""
-        ...
-
-    def facts(self) -> list[tuple[str, str]]:
-        """Label and value, for `radar-console info`."""
-        ...
-
-
-@dataclass(frozen=True)
-class Opened:
-    """A source, and the settings of the stages behind it.
-
-    Attributes
-    ----------
-    title : for the screen
-    kind : "simulation", "recording" or "plot table"
-    truth : where the targets are at a time, s; None if nobody knows
-    seed : of the tracker
-    """
-
-    source: Source
-    settings: Configuration
-    title: str
-    kind: str
-    truth: Callable[[float], Table] | None
-    seed: int
 
 
 def scenarios() -> dict[str, Path]:
@@ -82,14 +44,14 @@ def open_source(
     ------
     InputError, ScenarioError   the file or its content is not what was expected
     """
-    file = _find(name or DEMO)
+    file = find(name or DEMO)
     suffix = file.suffix.lower()
     if suffix == ".toml":
         return _simulation(file, config, seed)
     given = frozenset[str]()
     settings = Configuration()
     if config is not None:
-        settings, given = scenario.load_configuration(_find(str(config)))
+        settings, given = scenario.load_configuration(find(str(config)))
     if suffix in ASTERIX_SUFFIXES:
         from radar_console.asterix.source import AsterixRecording
 
@@ -111,7 +73,13 @@ def open_source(
     raise InputError(file, "", f"unknown kind of file; {EXPECTED}")
 
 
-def _find(name: str) -> Path:
+def find(name: str) -> Path:
+    """The file that the user named, or the scenario that comes along by that name.
+
+    Raises
+    ------
+    InputError   there is none
+    """
     file = Path(name)
     if file.is_file():
         return file
@@ -126,14 +94,7 @@ def _find(name: str) -> Path:
 
 
 def _simulation(file: Path, config: Path | None, seed: int | None) -> Opened:
-    from radar_console.simulator.radar import Simulator
-
     if config is not None:
         raise InputError(config, "", "--config goes with a recording; a scenario brings its own settings")
     settings = scenario.load(file)
-    seed = settings.seed if seed is None else seed
-    simulator = Simulator(settings, np.random.default_rng(seed), file)
-    own = Configuration(
-        radar=settings.radar, plots=settings.plots, tracker=settings.tracker, display=settings.display
-    )
-    return Opened(simulator, own, settings.title, "simulation", simulator.truth, seed)
+    return simulation(settings, settings.seed if seed is None else seed, file)

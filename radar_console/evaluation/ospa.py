@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 from numpy.typing import ArrayLike
 
-from radar_console.evaluation.gospa import gospa
+from radar_console.evaluation.gospa import Gospa, gospa
 
 
 class Ospa(NamedTuple):
@@ -39,10 +39,16 @@ def ospa(truth: ArrayLike, estimates: ArrayLike, c: float, p: float = 2.0) -> Os
     ------
     ValueError         as `gospa`
     """
-    whole = gospa(truth, estimates, c, p, alpha=1.0)
+    return averaged(gospa(truth, estimates, c, p, alpha=1.0), c, p)
+
+
+def averaged(whole: Gospa, c: float, p: float = 2.0) -> Ospa:
+    """OSPA from the parts of a GOSPA of the same `c` and `p`, whatever its α: they assign alike."""
     n, m = whole.assigned + whole.missed_count, whole.assigned + whole.false_count
     larger = max(n, m, 1)
+    # In units of c^p, so that no power overflows before the root is taken.
+    location = (whole.location / c**p + (min(n, m) - whole.assigned)) / larger
     cardinality = abs(n - m) / larger
-    value = whole.value / larger ** (1.0 / p)
-    location = max((value / c) ** p - cardinality, 0.0)
-    return Ospa(value, c * location ** (1.0 / p), c * cardinality ** (1.0 / p))
+    return Ospa(
+        c * (location + cardinality) ** (1.0 / p), c * location ** (1.0 / p), c * cardinality ** (1.0 / p)
+    )

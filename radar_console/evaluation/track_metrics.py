@@ -26,6 +26,7 @@ from scipy.spatial import KDTree
 from radar_console.core.messages import Table
 from radar_console.estimation.gaussian import Array
 from radar_console.evaluation.assignment import match
+from radar_console.evaluation.rmse import Rmse, rmse
 from radar_console.evaluation.sampling import Snapshot, snapshots
 
 Numbers = NDArray[np.int64]
@@ -45,6 +46,8 @@ class TrackMetrics:
     fragments : (n,) how often it was let go and held again, by whichever track  [3, "Frag"]
     swaps : (n,) how often the track that holds it is not the one that held it last  [1, "mismatch"]
     lost : (n,) it was held, but at none of its last instants (`tail` of them)
+    longest_segment : (n,) the longest stretch of instants at which one track holds it without a break, as
+        part of the target's instants; their mean weighted with the targets' lives is [2, "LS"]
     track : (m,) their numbers
     false : (m,) at more than half of its instants the track is near no target
     duplicate : (m,) at more than half of its instants it is near a target that another track holds
@@ -53,8 +56,11 @@ class TrackMetrics:
     completeness : part of the targets, over all instants, that have a track  [2, "C"]
     ambiguity : tracks a target that has one, 1 is best  [2, "A"]
     spuriousness : part of the tracks, over all instants, that are near no target  [2, "S"]
+    number_changes : swaps, over all targets, in a second in which a target is held, 1/s  [2, "R"]
     position_accuracy, velocity_accuracy : mean distance of the tracks from their targets, m and m/s;
         [2, "PA", "VA"]
+    position_rmse, velocity_rmse : of targets and the tracks that hold them, over all instants, m and
+        m/s, with the components east and north
 
     A ratio without anything to count is NaN.
     """
@@ -65,6 +71,7 @@ class TrackMetrics:
     fragments: Numbers
     swaps: Numbers
     lost: Flags
+    longest_segment: Array
     track: Numbers
     false: Flags
     duplicate: Flags
@@ -72,8 +79,11 @@ class TrackMetrics:
     completeness: float
     ambiguity: float
     spuriousness: float
+    number_changes: float
     position_accuracy: float
     velocity_accuracy: float
+    position_rmse: Rmse
+    velocity_rmse: Rmse
 
 
 def track_metrics(
@@ -94,18 +104,20 @@ def track_metrics(
     ------
     ValueError         gate or tail is not positive
     """
+    return track_metrics_of(snapshots(truth, tracks, memory), gate, tail)
+
+
+def track_metrics_of(pictures: Iterable[Snapshot], gate: float = 2000.0, tail: int = 10) -> TrackMetrics:
+    """Score a run by its snapshots, in the order of time; see `track_metrics`."""
     if not gate > 0.0 or tail < 1:
         raise ValueError(f"gate must be positive and tail at least 1, not {gate} and {tail}")
-    return _score(snapshots(truth, tracks, memory), gate, tail)
-
-
-def _score(pictures: Iterable[Snapshot], gate: float, tail: int) -> TrackMetrics:
-    """Gather who held whom, flat over all instants, and sum it up by target and by track."""
+    # Who held whom is gathered flat over all instants, and then summed up by target and by track.
     seen_time: list[Array] = [np.empty(0)]
     seen_target, holder, shown_track, holds = [_none()], [_none()], [_none()], [_none()]
     near: list[Flags] = [np.empty(0, np.bool_)]
     distances: list[Array] = [np.empty(0)]
     speeds: list[Array] = [np.empty(0)]
+    at: list[Array] = [np.empty((0, 2, 4))]  # the states of target and track in each pair that holds
     covered = 0
     bonds = _Bonds()
     for now in pictures:
@@ -114,6 +126,7 @@ def _score(pictures: Iterable[Snapshot], gate: float, tail: int) -> TrackMetrics
         held[row] = column
         seen_time.append(np.full(len(now.target), now.time))
         seen_target.append(now.target)
+        at.append(_states(now, row, column))
         holder.append(np.where(held >= 0, now.track[held] if len(now.track) else -1, _NOBODY))
         holding = np.full(len(now.track), _NOBODY)
         holding[column] = now.target[row]
@@ -126,19 +139,24 @@ def _score(pictures: Iterable[Snapshot], gate: float, tail: int) -> TrackMetrics
         distances.append(distance[inside])
         speeds.append(np.linalg.norm(now.velocity - now.truth_velocity[nearest], axis=1)[inside]
                       if len(now.target) else np.empty(0))  # fmt: skip
-    of_targets = _targets(
-        np.concatenate(seen_time), np.concatenate(seen_target), np.concatenate(holder), tail
-    )
+    times = np.concatenate(seen_time)
+    of_targets = _targets(times, np.concatenate(seen_target), np.concatenate(holder), tail)
     of_tracks = _tracks(np.concatenate(shown_track), np.concatenate(near), np.concatenate(holds))
     assigned = sum(map(len, distances))
+    pairs = np.concatenate(at)
+    instants = np.unique(times)
+    step = float(np.median(np.diff(instants))) if len(instants) > 1 else float("nan")
     return TrackMetrics(
         *of_targets,
         *of_tracks,
         completeness=_ratio(covered, sum(map(len, seen_target))),
         ambiguity=_ratio(assigned, covered),
         spuriousness=_ratio(sum(map(len, shown_track)) - assigned, sum(map(len, shown_track))),
+        number_changes=_ratio(float(of_targets[4].sum()), len(pairs)) / step,
         position_accuracy=_ratio(float(np.concatenate(distances).sum()), assigned),
         velocity_accuracy=_ratio(float(np.concatenate(speeds).sum()), assigned),
+        position_rmse=rmse(pairs[:, 0, :2], pairs[:, 1, :2]),
+        velocity_rmse=rmse(pairs[:, 0, 2:], pairs[:, 1, 2:]),
     )
 
 
@@ -151,6 +169,13 @@ def _none() -> Numbers:
 
 def _ratio(part: float, whole: float) -> float:
     return part / whole if whole else float("nan")
+
+
+def _states(now: Snapshot, row: Numbers, column: Numbers) -> Array:
+    """East, north and their rates of the targets and tracks of pairs, (pairs, 2, 4)."""
+    true = np.concatenate([now.truth[row], now.truth_velocity[row]], axis=1)
+    shown = np.concatenate([now.estimate[column], now.velocity[column]], axis=1)
+    return np.stack([true, shown], axis=1)
 
 
 class _Bonds:
@@ -196,7 +221,7 @@ def _nearest(now: Snapshot) -> tuple[Numbers, Array]:
 
 def _targets(
     time: Array, target: Numbers, holder: Numbers, tail: int
-) -> tuple[Numbers, Array, Array, Numbers, Numbers, Flags]:
+) -> tuple[Numbers, Array, Array, Numbers, Numbers, Flags, Array]:
     """Sums over the instants of each target; the arrays are in the order of time."""
     numbers, owner = np.unique(target, return_inverse=True)
     n = len(numbers)
@@ -221,7 +246,17 @@ def _targets(
         np.bincount(who[1:][gap], minlength=n),
         np.bincount(who[1:][other], minlength=n),
         (np.bincount(who, minlength=n) > 0) & (np.bincount(owner[held & late], minlength=n) == 0),
+        _longest(who, n, gap | other | ~same) / instants,
     )
+
+
+def _longest(who: Numbers, n: int, cut: Flags) -> Array:
+    """The most rows in a row of each of `n` owners; `cut` (rows - 1,) where a new stretch begins."""
+    longest = np.zeros(n)
+    if len(who):
+        starts = np.flatnonzero(np.append(True, cut))
+        np.maximum.at(longest, who[starts], np.diff(np.append(starts, len(who))))
+    return longest
 
 
 def _tracks(track: Numbers, near: Flags, holds: Numbers) -> tuple[Numbers, Flags, Flags, Array]:

@@ -2,8 +2,10 @@
 
 import csv
 import io
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from types import MappingProxyType
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,14 +34,25 @@ class Columns:
     others: tuple[str, ...]
 
 
-def read_columns(file: Path, required: tuple[str, ...], optional: tuple[str, ...]) -> Columns:
+def read_columns(
+    file: Path,
+    required: tuple[str, ...],
+    optional: tuple[str, ...],
+    kind: str = "plot",
+    words: Mapping[str, Mapping[str, float]] = MappingProxyType({}),
+) -> Columns:
     """Read the named columns.
+
+    Parameters
+    ----------
+    kind : what the rows are, for errors
+    words : by column, the words that stand for a number there
 
     Raises
     ------
     InputError   the file can't be read, is no text, or its header lacks or doubles a column
     """
-    lines = _text(file).splitlines()
+    lines = _text(file, kind).splitlines()
     if not any(line.strip() for line in lines):
         raise InputError(file, "", f"is empty; expected a header with {', '.join(required)}")
     header = [name.strip() for name in next(csv.reader(lines[:1]), [])]
@@ -56,25 +69,27 @@ def read_columns(file: Path, required: tuple[str, ...], optional: tuple[str, ...
     wanted = {name: header.index(name) for name in (*required, *optional) if name in header}
     others = tuple(name for name in header if name not in wanted)
     if len(lines) == 1:
-        raise InputError(file, "line 2", "no rows; expected plots below the header")
-    fast = _fast(lines[1:], wanted, len(header))
-    return (
-        _columns(fast, wanted, others) if fast is not None else _slow(lines[1:], wanted, others, len(header))
-    )
+        raise InputError(file, "line 2", f"no rows; expected {kind}s below the header")
+    fast = _fast(lines[1:], wanted, len(header), words)
+    if fast is not None:
+        return _columns(fast, wanted, others)
+    return _slow(lines[1:], wanted, others, len(header), words)
 
 
-def _text(file: Path) -> str:
+def _text(file: Path, kind: str) -> str:
     try:
         return file.read_text(encoding="utf-8-sig")
     except OSError as error:
         raise InputError(file, "", f"can't be read: {error.strerror}") from error
     except UnicodeDecodeError as error:
         raise InputError(
-            file, f"byte {error.start}", "not a text file; expected a plot table (CSV)"
+            file, f"byte {error.start}", f"not a text file; expected a table of {kind}s (CSV)"
         ) from error
 
 
-def _fast(lines: list[str], wanted: dict[str, int], width: int) -> Array | None:
+def _fast(
+    lines: list[str], wanted: dict[str, int], width: int, words: Mapping[str, Mapping[str, float]]
+) -> Array | None:
     """All rows at once, (rows, width); None where a row needs a closer look."""
     if any(line.count(",") != width - 1 for line in lines):
         return None
@@ -84,9 +99,14 @@ def _fast(lines: list[str], wanted: dict[str, int], width: int) -> Array | None:
         body += "nan"
     try:
         values: Array = np.loadtxt(
-            io.StringIO(body), delimiter=",", usecols=list(wanted.values()), ndmin=2, comments=None
+            io.StringIO(body),
+            delimiter=",",
+            usecols=list(wanted.values()),
+            ndmin=2,
+            comments=None,
+            converters={wanted[name]: known.__getitem__ for name, known in words.items() if name in wanted},
         )
-    except ValueError:
+    except (ValueError, KeyError):
         return None
     return values if len(values) == len(lines) else None
 
@@ -102,7 +122,14 @@ def _columns(values: Array, wanted: dict[str, int], others: tuple[str, ...]) -> 
     )
 
 
-def _slow(lines: list[str], wanted: dict[str, int], others: tuple[str, ...], width: int) -> Columns:
+def _slow(
+    lines: list[str],
+    wanted: dict[str, int],
+    others: tuple[str, ...],
+    width: int,
+    words: Mapping[str, Mapping[str, float]],
+) -> Columns:
+    known = [words.get(name) for name in wanted]
     reader = csv.reader(lines)
     values: list[list[float]] = []
     unreadable: list[list[bool]] = []
@@ -118,7 +145,10 @@ def _slow(lines: list[str], wanted: dict[str, int], others: tuple[str, ...], wid
         if not row:
             continue
         fields = [row[i].strip() if i < len(row) else "" for i in wanted.values()]
-        read = [_number(text) for text in fields]
+        read = [
+            _number(text) if names is None else names.get(text)
+            for text, names in zip(fields, known, strict=True)
+        ]
         values.append([np.nan if number is None else number for number in read])
         unreadable.append([number is None for number in read])
         misshapen.append(len(row) != width)

@@ -7,9 +7,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from radar_console.app.chain import Chain
 from radar_console.app.console import options_of
 from radar_console.app.opening import open_source, scenarios
+from radar_console.chain import Chain
 from radar_console.core.messages import Table, TrackStatus
 
 TURNS = 6

@@ -11,7 +11,7 @@ from scipy.optimize import linear_sum_assignment
 
 from radar_console.evaluation.assignment import match
 from radar_console.evaluation.gospa import gospa
-from radar_console.evaluation.ospa import ospa
+from radar_console.evaluation.ospa import averaged, ospa
 
 C = 1000.0
 # Sums of a few terms of at most c^p, and one root: a thousand roundings at most.
@@ -91,6 +91,7 @@ def test_parts_make_the_whole(x, y, p, alpha):
         assert whole.missed == pytest.approx(whole.missed_count * C**p / 2, rel=ROUNDING)
         assert whole.false == pytest.approx(whole.false_count * C**p / 2, rel=ROUNDING)
     mean = ospa(x, y, C, p)
+    assert averaged(whole, C, p) == pytest.approx(mean, rel=ROUNDING)
     assert mean.value**p == pytest.approx(mean.location**p + mean.cardinality**p, rel=ROUNDING)
 
 

@@ -52,6 +52,9 @@ def test_a_perfect_run():
         assert not nothing.any()
     assert (score.completeness, score.ambiguity, score.spuriousness) == (1.0, 1.0, 0.0)
     assert (score.position_accuracy, score.velocity_accuracy) == (0.0, 0.0)
+    assert (score.position_rmse.value, score.velocity_rmse.value) == (0.0, 0.0)
+    assert score.longest_segment.tolist() == [1.0, 1.0]
+    assert score.number_changes == 0.0
 
 
 def test_no_tracks_and_no_targets():
@@ -62,6 +65,8 @@ def test_no_tracks_and_no_targets():
     assert not score.lost.any()  # never held: nothing to lose
     assert score.completeness == 0.0
     assert np.isnan([score.ambiguity, score.spuriousness, score.position_accuracy]).all()
+    assert np.isnan([score.position_rmse.value, score.velocity_rmse.value, score.number_changes]).all()
+    assert score.longest_segment.tolist() == [0.0, 0.0]
     score = track_metrics(empty_truth, tracks_of([(0, 1, 0.0)]))
     assert len(score.target) == len(score.track) == 0
 
@@ -83,6 +88,30 @@ def test_confirmation_a_gap_and_another_track():
     assert (score.fragments.tolist(), score.swaps.tolist()) == ([1], [1])
     assert score.track.tolist() == [5, 6]
     assert score.position_accuracy == pytest.approx((3 * 3.0 + 4 * 4.0) / 7)
+    assert score.position_rmse.value == pytest.approx(np.sqrt((3 * 3.0**2 + 4 * 4.0**2) / 7))
+    assert score.position_rmse.components == pytest.approx([score.position_rmse.value, 0.0])
+    assert score.longest_segment.tolist() == [0.4]  # track 6 at 6 to 9, of ten instants
+    assert score.number_changes == pytest.approx(1 / 7)  # one swap in 7 s in which it is held
+
+
+def test_the_longest_segment_ends_at_a_gap_and_at_another_track():
+    """Held by 1 at 0 and 1, by nobody at 2, by 1 from 3 to 5, by 2 from 6 to 9; the other target never."""
+    tracks = tracks_of(
+        [(0, 1, 0.0), (2, 1, 0.0, DELETED), (3, 1, 0.0), (6, 1, 0.0, DELETED), (6, 2, 0.0), (9.5, 2, 0.0)]
+    )
+    score = track_metrics(standing(2), tracks, GATE)
+    assert score.longest_segment.tolist() == [0.4, 0.0]
+    assert (score.fragments.tolist(), score.swaps.tolist()) == ([1, 0], [1, 0])
+
+
+def test_rmse_is_of_the_track_that_holds_and_its_velocity_counts():
+    """A duplicate farther off does not enter; the velocities err by (10, −20) m/s."""
+    tracks = tracks_of([(t, 1, 30.0) for t in range(10)] + [(t, 2, 60.0) for t in range(10)])
+    tracks["v_east"], tracks["v_north"] = 10.0, -20.0
+    score = track_metrics(standing(1), tracks, GATE)
+    assert score.position_rmse.components == pytest.approx([30.0, 0.0])
+    assert score.velocity_rmse.components == pytest.approx([10.0, 20.0])
+    assert score.position_accuracy == pytest.approx(45.0)  # of SIAP: of all tracks near the target
 
 
 def test_two_tracks_change_targets():
@@ -176,11 +205,18 @@ def test_order_numbers_and_directions_do_not_matter(seed, turn):
         "duplicate",
         "purity",
         "time_to_confirm",
+        "longest_segment",
+        "number_changes",
     ):
         np.testing.assert_array_equal(getattr(after, name), getattr(before, name))
     # Turned coordinates are rounded, to 1e-13 of a few hundred metres.
     for name in ("completeness", "ambiguity", "spuriousness", "position_accuracy", "velocity_accuracy"):
         assert getattr(after, name) == pytest.approx(getattr(before, name), rel=1e-12, nan_ok=True)
+    for name in ("position_rmse", "velocity_rmse"):
+        assert getattr(after, name).value == pytest.approx(
+            getattr(before, name).value, rel=1e-12, nan_ok=True
+        )
+    assert (before.longest_segment <= before.continuity).all()
     assert (before.continuity <= 1.0).all()
     assert (before.fragments + (before.continuity > 0) <= 6).all()
 

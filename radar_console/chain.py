@@ -1,22 +1,79 @@
-"""The chain behind a source: clustering, tracker, and what is measured on the way."""
+"""A source, the chain behind it (clustering, tracker), and what is measured on the way."""
 
 import math
 import time
 from collections import defaultdict
-from collections.abc import Generator, Iterable, Iterator
+from collections.abc import Callable, Generator, Iterable, Iterator, Mapping
 from contextlib import closing
 from dataclasses import dataclass, field
 from itertools import islice
+from pathlib import Path
+from typing import Protocol
 
-from radar_console import pipeline, tracker
-from radar_console.app.opening import Opened
+import numpy as np
+
+from radar_console import pipeline
 from radar_console.core.geometry import Array
-from radar_console.core.messages import Sector, TrackStatus
+from radar_console.core.messages import Sector, Table, TrackStatus
 from radar_console.core.units import TURN
 from radar_console.pipeline import Gauge, Pace, Policy
-from radar_console.plots.clustering import Clustering
+from radar_console.scenario import Configuration, Scenario
 
 PRIMING = 8  # sectors; the first returns load the kernels
+
+
+class Source(pipeline.Source, Protocol):
+    """A source that can also say what it holds."""
+
+    @property
+    def noted(self) -> Mapping[str, int]:
+        """What was mended or is worth knowing, counted; nothing of it was lost."""
+        ...
+
+    def facts(self) -> list[tuple[str, str]]:
+        """Label and value, for `radar-console info`."""
+        ...
+
+
+@dataclass(frozen=True)
+class Opened:
+    """A source, and the settings of the stages behind it.
+
+    Attributes
+    ----------
+    title : for the screen
+    kind : "simulation", "recording" or "plot table"
+    truth : where the targets are at a time, s; None if nobody knows
+    seed : of the tracker
+    """
+
+    source: Source
+    settings: Configuration
+    title: str
+    kind: str
+    truth: Callable[[float], Table] | None
+    seed: int
+
+
+def simulation(settings: Scenario, seed: int, file: Path | str = "") -> Opened:
+    """The simulator of a scenario, and the settings of the stages behind it.
+
+    Parameters
+    ----------
+    seed : of the simulator and of the tracker
+    file : named in errors
+
+    Raises
+    ------
+    ScenarioError   the scenario can't be played
+    """
+    from radar_console.simulator.radar import Simulator
+
+    simulator = Simulator(settings, np.random.default_rng(seed), file)
+    own = Configuration(
+        radar=settings.radar, plots=settings.plots, tracker=settings.tracker, display=settings.display
+    )
+    return Opened(simulator, own, settings.title, "simulation", simulator.truth, seed)
 
 
 @dataclass
@@ -63,16 +120,28 @@ class Tally:
 
 @dataclass
 class Chain:
-    """A source with its stages, ready to run once."""
+    """A source with its stages, ready to run once.
+
+    Attributes
+    ----------
+    tracker_threads : how many threads the tracker may use; the same tracks with any number
+    clock : what the tracker's time is taken with, s
+    """
 
     opened: Opened
+    tracker_threads: int | None = None
+    clock: Callable[[], float] = time.perf_counter
     tally: Tally = field(default_factory=Tally)
     gauge: Gauge = field(default_factory=Gauge)
 
     def __post_init__(self) -> None:
-        settings = self.opened.settings
+        # Imported here: who only opens a source need not wait for the kernels.
+        from radar_console.plots.clustering import Clustering
+        from radar_console.tracker import Tracker
+
+        opened, settings = self.opened, self.opened.settings
         self.clustering = Clustering(settings.plots, settings.radar)
-        self.tracker = tracker.Tracker(settings.tracker, self.opened.source.radar, self.opened.seed)
+        self.tracker = Tracker(settings.tracker, opened.source.radar, opened.seed, self.tracker_threads)
 
     def run(
         self, threads: bool = False, pace: Pace | None = None, policy: Policy = Policy.BLOCK
@@ -128,11 +197,11 @@ class Chain:
     def _timed_tracker(self, sectors: Iterable[Sector]) -> Iterator[Sector]:
         """The tracker stage, its time added up for each turn of the antenna."""
         for sector in sectors:
-            began = time.perf_counter()
+            began = self.clock()
             done = self.tracker.push(sector)
             # A sector that ends at north, or one without extent there, belongs to the turn before.
             turn = math.ceil(sector.end / TURN - 1e-9) - 1
-            self.tally.tracker_s[turn] += time.perf_counter() - began
+            self.tally.tracker_s[turn] += self.clock() - began
             yield done
         rest = self.tracker.flush()
         if rest is not None:
