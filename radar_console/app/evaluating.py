@@ -16,11 +16,10 @@ from radar_console.app.status import RunLine
 from radar_console.core.errors import InputError, RadarConsoleError
 from radar_console.evaluation.grid import Setting, grid, label, option
 from radar_console.evaluation.monte_carlo import Progress, carry_out
-from radar_console.evaluation.report import MAIN, page
 from radar_console.evaluation.results import Results
 from radar_console.evaluation.scenario_run import RUN_METRICS, ScenarioRun
 from radar_console.evaluation.scoring import METRICS, Scoring, score
-from radar_console.evaluation.summary import summarise, worded
+from radar_console.evaluation.summary import MAIN, summarise, worded
 from radar_console.evaluation.workers import Workers, dask, inline, processes
 from radar_console.recording.scored import read_tracks, read_truth
 
@@ -76,6 +75,8 @@ class Evaluation:
         return progress
 
     def _report(self, results: Results) -> None:
+        from radar_console.evaluation.report import page  # with it comes matplotlib
+
         scoring = self.run.scoring
         about = [
             ("scenario", f"{self.file.name}, {self.scenario.duration_s:g} s"),

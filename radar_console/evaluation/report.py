@@ -9,20 +9,7 @@ from radar_console.evaluation import plots
 from radar_console.evaluation.grid import label
 from radar_console.evaluation.results import Results
 from radar_console.evaluation.scoring import Metric
-from radar_console.evaluation.summary import Summary, summarise, verdict, worded
-
-MAIN = (
-    "gospa_m",
-    "rmse_position_m",
-    "rmse_velocity_mps",
-    "time_to_confirm_s",
-    "continuity",
-    "swaps",
-    "lost",
-    "false_tracks",
-    "tracker_ms_per_turn",
-)
-"""The metrics that are drawn, and said on the terminal."""
+from radar_console.evaluation.summary import MAIN, Summary, summarise, verdict, worded
 
 STYLE = """
 body { font: 15px/1.45 system-ui, sans-serif; margin: 2em auto; max-width: 72em; padding: 0 1em; }

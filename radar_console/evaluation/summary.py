@@ -11,6 +11,18 @@ from radar_console.evaluation.intervals import Interval
 from radar_console.evaluation.results import Results
 from radar_console.evaluation.scoring import Metric
 
+MAIN = (
+    "gospa_m",
+    "rmse_position_m",
+    "rmse_velocity_mps",
+    "time_to_confirm_s",
+    "continuity",
+    "swaps",
+    "lost",
+    "false_tracks",
+    "tracker_ms_per_turn",
+)
+"""The metrics that are drawn, and said on the terminal."""
 
 RESAMPLES = 2000  # of the bootstrap; its chance moves a bound by some 2 % of the interval
 
