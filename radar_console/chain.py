@@ -2,7 +2,6 @@
 
 import math
 import time
-from collections import defaultdict
 from collections.abc import Callable, Generator, Iterable, Iterator, Mapping
 from contextlib import closing
 from dataclasses import dataclass, field
@@ -13,7 +12,7 @@ from typing import Protocol
 import numpy as np
 
 from radar_console import pipeline
-from radar_console.core.geometry import Array
+from radar_console.core.durations import Durations
 from radar_console.core.messages import Sector, Table, TrackStatus
 from radar_console.core.units import TURN
 from radar_console.pipeline import Gauge, Pace, Policy
@@ -86,8 +85,11 @@ class Tally:
     live: dict[int, int] = field(default_factory=dict)
     data_time: float = 0.0
     raw: bool = False
-    tracker_s: defaultdict[int, float] = field(default_factory=lambda: defaultdict(float))
-    latency_s: list[Array] = field(default_factory=list)
+    turns: int = 0
+    tracker_s: Durations = field(default_factory=Durations)
+    latency_s: Durations = field(default_factory=Durations)
+    _turn: int | None = None
+    _turn_s: float = 0.0
 
     def take(self, sector: Sector) -> None:
         """Count what a sector brought at the end of the chain."""
@@ -99,7 +101,7 @@ class Tally:
         tracks = sector.tracks
         if not len(tracks):
             return
-        self.latency_s.append(sector.stop - tracks["plot_time"][tracks["hit"]])
+        self.latency_s.add(sector.stop - tracks["plot_time"][tracks["hit"]])
         for number, status in zip(tracks["track"].tolist(), tracks["status"].tolist(), strict=True):
             if status == TrackStatus.DELETED:
                 self.live.pop(number, None)
@@ -108,10 +110,18 @@ class Tally:
             if status == TrackStatus.CONFIRMED:
                 self.confirmed.add(number)
 
-    @property
-    def turns(self) -> int:
-        """Turns of the antenna so far."""
-        return len(self.tracker_s)
+    def took(self, turn: int, seconds: float) -> None:
+        """Add up what the tracker took in a turn of the antenna."""
+        if self._turn is None or turn > self._turn:
+            self.end_turn()
+            self._turn, self.turns = turn, self.turns + 1
+        self._turn_s += seconds
+
+    def end_turn(self) -> None:
+        """Count what the tracker took in the turn that ends."""
+        if self._turn is not None:
+            self.tracker_s.add(self._turn_s)
+        self._turn, self._turn_s = None, 0.0
 
     def live_with(self, *statuses: TrackStatus) -> int:
         """How many tracks live now with one of these statuses."""
@@ -201,8 +211,9 @@ class Chain:
             done = self.tracker.push(sector)
             # A sector that ends at north, or one without extent there, belongs to the turn before.
             turn = math.ceil(sector.end / TURN - 1e-9) - 1
-            self.tally.tracker_s[turn] += self.clock() - began
+            self.tally.took(turn, self.clock() - began)
             yield done
+        self.tally.end_turn()
         rest = self.tracker.flush()
         if rest is not None:
             yield rest

@@ -8,12 +8,10 @@ from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from radar_console.app.status import StatusLine
 from radar_console.chain import Chain, Opened, Tally
+from radar_console.core.durations import Durations
 from radar_console.core.errors import InputError
-from radar_console.core.geometry import Array
 from radar_console.core.messages import TrackStatus
 from radar_console.recording.writing import PlotWriter, TrackWriter, TruthWriter
 
@@ -68,14 +66,13 @@ def brief(tally: Tally) -> str:
 def figures_of(chain: Chain, wall_s: float) -> dict[str, Any]:
     """The figures of a finished run, by the names of `stats.json`."""
     tally = chain.tally
-    latency = np.concatenate(tally.latency_s) if tally.latency_s else np.empty(0)
     return {
         "scans": tally.turns,
         "plots": tally.plots,
         "centroids": tally.centroids,
         "tracks_confirmed": len(tally.confirmed),
-        "tracker_s_per_scan": _spread(np.array(list(tally.tracker_s.values()))),
-        "latency_s": _spread(latency),
+        "tracker_s_per_scan": _spread(tally.tracker_s),
+        "latency_s": _spread(tally.latency_s),
         "dropped": chain.gauge.sectors_dropped,
         "skipped": chain.skipped,
         "noted": chain.noted,
@@ -84,12 +81,12 @@ def figures_of(chain: Chain, wall_s: float) -> dict[str, Any]:
     }
 
 
-def _spread(values: Array) -> dict[str, float | None]:
+def _spread(times: Durations) -> dict[str, float | None]:
     """Median, 99th percentile and maximum; null when there is nothing."""
-    if not len(values):
+    if not len(times):
         return {"median": None, "p99": None, "max": None}
-    median, p99, top = np.quantile(values, [0.5, 0.99, 1.0]).round(6).tolist()
-    return {"median": median, "p99": p99, "max": top}
+    found = {"median": times.quantile(0.5), "p99": times.quantile(0.99), "max": times.longest}
+    return {name: round(value, 6) for name, value in found.items()}
 
 
 def peak_rss_mb() -> float | None:
