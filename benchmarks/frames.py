@@ -21,17 +21,16 @@ import numpy as np
 from numpy.typing import NDArray
 from PySide6.QtWidgets import QApplication
 
-from radar_console.app.console import options_of
+from radar_console.app.console import Health, options_of
 from radar_console.app.opening import open_source
 from radar_console.chain import Chain
-from radar_console.core.messages import Radar, Sector
+from radar_console.core.messages import Sector
 from radar_console.display.feed import Feed
-from radar_console.display.options import Options
 from radar_console.display.picture import Picture
 from radar_console.display.ppi import Ppi
 from radar_console.display.view import View
 from radar_console.display.window import ConsoleWindow
-from radar_console.pipeline import Gauge, Pace
+from radar_console.pipeline import Pace
 
 SCENES = ("twenty-five", "stress")
 SIZE = 1024
@@ -42,15 +41,14 @@ WARM_UP = 20.0
 Show = Callable[[list[Sector]], None]
 
 
-def record(scene: str, seconds: float) -> tuple[Options, Radar, list[Sector]]:
-    """The start of a scenario, tracked."""
-    opened = open_source(scene)
-    sectors = []
-    for sector in Chain(opened).run():
+def record(scene: str, seconds: float) -> tuple[Chain, list[Sector]]:
+    """The start of a scenario, tracked, and the chain that did it."""
+    chain, sectors = Chain(open_source(scene)), []
+    for sector in chain.run():
         sectors.append(sector)
         if sector.stop > seconds:
             break
-    return options_of(opened, None), opened.source.radar, sectors
+    return chain, sectors
 
 
 def scope() -> Show:
@@ -69,10 +67,10 @@ def scope() -> Show:
     return show
 
 
-def console(options: Options, radar: Radar) -> Show:
+def console(chain: Chain) -> Show:
     """The whole window, as its timers drive it."""
-    feed = Feed()
-    window = ConsoleWindow(radar, feed, Pace(), Gauge(), options)
+    feed, opened = Feed(), chain.opened
+    window = ConsoleWindow(opened.source.radar, feed, Pace(), Health(chain), options_of(opened, None))
     window.resize(*WINDOW)
     window.show()
     frames = 0
@@ -113,8 +111,8 @@ def main() -> None:
     app = QApplication([])
     print("scene         view     frames  ms: median    p99    max | processor: median    p99")
     for scene in arguments.scenes:
-        options, radar, sectors = record(scene, WARM_UP + arguments.seconds + 1.0)
-        for name, show in (("scope", scope()), ("console", console(options, radar))):
+        chain, sectors = record(scene, WARM_UP + arguments.seconds + 1.0)
+        for name, show in (("scope", scope()), ("console", console(chain))):
             QApplication.processEvents()
             wall, busy = 1e3 * measure(show, sectors, arguments.seconds).T
             p50, p99 = np.percentile(wall, [50, 99])

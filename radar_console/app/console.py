@@ -5,7 +5,7 @@ import math
 import os
 import sys
 import threading
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import closing
 from pathlib import Path
 
@@ -20,6 +20,33 @@ from radar_console.display.options import Options
 from radar_console.pipeline import Pace, Policy
 
 log = logging.getLogger(__name__)
+
+
+class Health:
+    """How a chain fares, for the console's status bar."""
+
+    def __init__(self, chain: Chain) -> None:
+        self._chain = chain
+
+    @property
+    def depth(self) -> int:
+        """Sectors that wait in the queues."""
+        return self._chain.gauge.depth
+
+    @property
+    def sectors_dropped(self) -> int:
+        """Sectors that the queues lost."""
+        return self._chain.gauge.sectors_dropped
+
+    @property
+    def returns_dropped(self) -> int:
+        """Their plots and centroids."""
+        return self._chain.gauge.returns_dropped
+
+    @property
+    def skipped(self) -> Mapping[str, int]:
+        """What source and stages could not use, by reason."""
+        return self._chain.skipped
 
 
 def display_missing() -> bool:
@@ -76,7 +103,7 @@ def run(opened: Opened, speed: float, user_map: Path | None) -> int:
 
     thread = threading.Thread(target=pump, name="pump", daemon=True)
     thread.start()
-    code = console.run(opened.source.radar, feed, pace, chain.gauge, options_of(opened, user_map))
+    code = console.run(opened.source.radar, feed, pace, Health(chain), options_of(opened, user_map))
     closed.set()
     pace.paused, pace.rate = False, math.inf  # a thread that waits for the clock goes on at once
     thread.join(2.0)
@@ -116,6 +143,7 @@ def screenshot(
             after,
             size,
             rate=speed,
+            health=Health(chain),
         )
 
 

@@ -7,8 +7,8 @@ import os
 import signal
 import time
 from collections import deque
-from collections.abc import Callable, Iterable
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -34,6 +34,7 @@ class _Still:
     depth: int = 0
     sectors_dropped: int = 0
     returns_dropped: int = 0
+    skipped: Mapping[str, int] = field(default_factory=dict)
 
 
 def run(radar: Radar, feed: Feed, controls: Controls, health: Health, options: Options) -> int:
@@ -71,6 +72,7 @@ def screenshot(
     size: tuple[int, int] = SIZE,
     progress: Callable[[float], None] | None = None,
     rate: float = 1.0,
+    health: Health | None = None,
 ) -> None:
     """Render the console as it is `after_s` seconds into the data (None: at its end) to a PNG file.
 
@@ -80,6 +82,7 @@ def screenshot(
     size : of the picture, px
     progress : called with the data time of every sector, s
     rate : of the playback, for the status bar
+    health : of the chain that delivers the sectors
 
     Raises
     ------
@@ -92,7 +95,7 @@ def screenshot(
 
     application = QApplication.instance() or QApplication(["radar-console"])
     still = _Still(rate)
-    window = ConsoleWindow(radar, Feed(), still, still, options)
+    window = ConsoleWindow(radar, Feed(), still, health or still, options)
     render(window, sectors, truth, after_s, size, progress)
     image = window.grab().toImage()
     window.deleteLater()

@@ -107,7 +107,7 @@ class Details(QWidget):
         if not math.isfinite(one["up"]):
             return self.tr("not measured")
         spread = f" ± {one['sd_up']:.0f}" if math.isfinite(one["sd_up"]) else ""
-        return f"{one['up']:,.0f}{spread} m".replace(",", "\u2009")
+        return f"{quantities.count(one['up'])}{spread} m"
 
     def _place(self, one: Any, frame: LocalFrame | None) -> str:
         if frame is None:

@@ -7,6 +7,7 @@ signal is sent per sector, so that a busy console is never flooded with events.
 import threading
 import time
 from collections import deque
+from collections.abc import Mapping
 from typing import NamedTuple, Protocol
 
 from radar_console.core.messages import Sector, Table
@@ -20,7 +21,7 @@ class Controls(Protocol):
 
 
 class Health(Protocol):
-    """What waits in the pipeline's queues, and what they lost."""
+    """What waits in the pipeline's queues, what they lost, and what could not be used."""
 
     @property
     def depth(self) -> int: ...
@@ -28,6 +29,10 @@ class Health(Protocol):
     def sectors_dropped(self) -> int: ...
     @property
     def returns_dropped(self) -> int: ...
+    @property
+    def skipped(self) -> Mapping[str, int]:
+        """What source and stages could not use, counted by reason."""
+        ...
 
 
 class Batch(NamedTuple):

@@ -15,6 +15,11 @@ def significant(value: float) -> str:
     return f"{value:.{decimals}f}".replace("-", "−")
 
 
+def count(number: float) -> str:
+    """A whole number, its thousands apart."""
+    return f"{number:,.0f}".replace(",", "\u2009")
+
+
 def bearing(azimuth: float, decimals: int = 0) -> str:
     """An azimuth, rad, as 007° or 007.3°, never 360°."""
     if not math.isfinite(azimuth):

@@ -4,6 +4,7 @@ Drops and ages are never hidden. Every field has a fixed width, so that nothing 
 gets a digit more.
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 from PySide6.QtCore import Qt
@@ -34,6 +35,7 @@ class Status:
     age_s : wall time since the newest data came; NaN before any
     depth : sectors that wait, in all queues
     sectors_dropped, returns_dropped : lost because something was too slow
+    skipped : what could not be used, counted by reason
     stalled : the encoder stands still
     reduced : what the governor has taken back; empty if nothing
     """
@@ -51,6 +53,7 @@ class Status:
     depth: int
     sectors_dropped: int
     returns_dropped: int
+    skipped: Mapping[str, int]
     stalled: bool
     reduced: str = ""
 
@@ -74,6 +77,7 @@ class StatusBar(QWidget):
         self.fps = self._field("60 fps")
         self.age = self._field("data 0.05 s")
         self.depth_field = self._field("queue 64")
+        self.skipped = self._field("")
         self.drops = self._field("")
         layout = QHBoxLayout(self)
         layout.setContentsMargins(_MARGIN, 0, _MARGIN, 0)
@@ -81,7 +85,15 @@ class StatusBar(QWidget):
         for label in (self.moment, self.rate, self.rotation, self.scale, self.cursor_field):
             layout.addWidget(label)
         layout.addStretch(1)
-        for label in (self.reduced, self.tracker, self.fps, self.age, self.depth_field, self.drops):
+        for label in (
+            self.reduced,
+            self.tracker,
+            self.fps,
+            self.age,
+            self.depth_field,
+            self.skipped,
+            self.drops,
+        ):
             layout.addWidget(label)
 
     def show_status(self, status: Status) -> None:
@@ -101,11 +113,12 @@ class StatusBar(QWidget):
             f"{self.tr('queue')} {status.depth}",
             "warning" if status.depth >= DEEP else "dim",
         )
+        self._show_skipped(status)
         self._show_drops(status)
         self._fit()
 
     def _fit(self) -> None:
-        """Where the window is narrow, what can be missed gives way; never the drops."""
+        """Where the window is narrow, what can be missed gives way; never what was lost."""
         fields = self.findChildren(QLabel)
         for label in fields:
             label.setVisible(bool(label.text()))
@@ -144,10 +157,18 @@ class StatusBar(QWidget):
             mark = "▲ " if level == "alarm" else ""
             _write(self.age, f"{mark}{self.tr('data')} {age} s", level)
 
+    def _show_skipped(self, status: Status) -> None:
+        """How much could not be used; the reasons come when the pointer rests on it."""
+        total = sum(status.skipped.values())
+        _write(self.skipped, f"{self.tr('skipped')} {quantities.count(total)}" if total else "", "warning")
+        reasons = "\n".join(f"{quantities.count(n)}  {reason}" for reason, n in status.skipped.items())
+        if self.skipped.toolTip() != reasons:
+            self.skipped.setToolTip(reasons)
+
     def _show_drops(self, status: Status) -> None:
         text = f"{self.tr('dropped')} {status.sectors_dropped}"
         if status.sectors_dropped:
-            returns = f"{status.returns_dropped:,}".replace(",", "\u2009")
+            returns = quantities.count(status.returns_dropped)
             text = f"▲ {text} {self.tr('sectors')}, {returns} {self.tr('returns')}"
         _write(self.drops, text, "alarm" if status.sectors_dropped else "dim")
 

@@ -219,7 +219,7 @@ class TrackModel(QAbstractTableModel):
             case 6:
                 return quantities.duration(value)
             case 7:
-                return f"{value:,.0f}".replace(",", "\u2009") if np.isfinite(value) else quantities.NONE
+                return quantities.count(value) if np.isfinite(value) else quantities.NONE
             case _:
                 return f"{int(value):04o}" if np.isfinite(value) else quantities.NONE
 

@@ -230,6 +230,7 @@ class ConsoleWindow(QMainWindow):
             depth=health.depth + feed.depth,
             sectors_dropped=health.sectors_dropped + feed.sectors_dropped,
             returns_dropped=health.returns_dropped + feed.returns_dropped,
+            skipped=health.skipped,
             stalled=self.picture.stalled,
             reduced=self.governor.reduced,
         )

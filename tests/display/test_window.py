@@ -31,6 +31,7 @@ class Playback:
         self.depth = 0
         self.sectors_dropped = 0
         self.returns_dropped = 0
+        self.skipped: dict[str, int] = {}
 
 
 @pytest.fixture
@@ -292,6 +293,17 @@ def test_drops_of_the_queues_and_of_the_feed_are_shown(window: ConsoleWindow, pl
     assert window.status.drops.text().startswith(f"▲ dropped {2 + small.sectors_dropped} sectors")
     assert window.status.drops.property("state") == "alarm"
     assert window.status.drops.isVisible()
+
+
+def test_what_could_not_be_used_is_counted_with_its_reasons(
+    window: ConsoleWindow, playback: Playback
+) -> None:
+    assert not window.status.skipped.isVisible()
+    playback.skipped = {"trailer bytes": 1200, "young tracks beyond max_tracks": 3}
+    window.refresh()
+    assert window.status.skipped.isVisible()
+    assert window.status.skipped.text() == "skipped 1\u2009203"
+    assert window.status.skipped.toolTip().splitlines()[1] == "3  young tracks beyond max_tracks"
 
 
 def test_drops_stay_visible_in_a_narrow_window(window: ConsoleWindow, playback: Playback) -> None:
