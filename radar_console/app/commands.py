@@ -143,6 +143,7 @@ def console(
     opened = open_source(source, config, seed, _sac_sic(radar))
     if screenshot is not None:
         with _interruptible("no picture was written"):
+            _ensure_warm()
             live.screenshot(opened, screenshot, after, _size(size), user_map, speed)
     elif live.display_missing():
         file = Path("radar-console.png")
@@ -152,6 +153,7 @@ def console(
             err=True,
         )
         with _interruptible("no picture was written"):
+            _ensure_warm()
             live.screenshot(opened, file, after, _size(size), user_map, speed)
         typer.echo(f"The picture of the console is in {file.resolve()}")
     else:
@@ -193,6 +195,7 @@ def track(
     opened = open_source(source, config, seed, _sac_sic(radar))
     _all_different(source, output, stats)
     with _interruptible(f"what was tracked until then is in {output}"):
+        _ensure_warm()
         figures = headless.track(opened, output, stats, threaded)
     _report(figures, output)
 
@@ -315,6 +318,8 @@ def evaluate(
     evaluation = evaluating.Evaluation(scenario or "", options or [], output, scoring)
     left = f"the runs done are in {evaluation.folder}, and the same command goes on from there"
     with _interruptible(left):
+        if dask is None:
+            _ensure_warm()
         progress = evaluation.carry_out(runs, seed, again, evaluating.workers_of(dask, jobs))
     typer.echo(f"{progress.done:,} runs → {evaluation.folder / 'report.html'}", err=True)
     failed = evaluation.failed
@@ -394,16 +399,29 @@ def study(
     with _interruptible(
         f"finished parts are in {studying.folder_of(name, output)}; the same command goes on from there"
     ):
+        _ensure_warm()
         folder = studying.study(name, runs, seed, jobs, output)
     typer.echo(f"Table, figures and results.json are in {folder}", err=True)
 
 
 @app.command("warm-up", hidden=True)
-def warm_up() -> None:
+def warm_up(
+    count: Annotated[bool, typer.Option("--count", help="Say the number of compiled kernels.")] = False,
+) -> None:
     """Compile what is compiled, so that the first start is quick."""
-    from radar_console.app.warming import warm_up as warm
+    from radar_console.app import warming
 
-    warm()
+    if count:
+        warming.Counter(lambda done: print(done, flush=True))
+    warming.warm_up()
+
+
+def _ensure_warm() -> None:
+    """Before a run without a window: compile on a first start, and say so."""
+    from radar_console.app.status import WordLine
+    from radar_console.app.warming import ensure_warm
+
+    ensure_warm(WordLine())
 
 
 def main() -> None:

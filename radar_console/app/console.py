@@ -79,6 +79,7 @@ def options_of(opened: Opened, user_map: Path | None) -> Options:
 
 def run(opened: Opened, speed: float, user_map: Path | None) -> int:
     """Open the window and stay until it is closed; the exit code."""
+    from radar_console.app.warming import ensure_warm
     from radar_console.display import console
 
     chain, feed, pace = Chain(opened), Feed(), Pace(speed)
@@ -86,6 +87,7 @@ def run(opened: Opened, speed: float, user_map: Path | None) -> int:
 
     def pump() -> None:
         try:
+            ensure_warm(feed.say)
             chain.prime()
             with closing(chain.run(threads=True, pace=pace, policy=Policy.DROP)) as sectors:
                 for sector in sectors:

@@ -68,6 +68,21 @@ class StatusLine:
             self._console.print(f"{self._title}: {text}", highlight=False)
 
 
+class WordLine:
+    """What a command waits for, on standard error: now and then, and when it is over."""
+
+    def __init__(self) -> None:
+        self._console = Console(file=sys.stderr)
+        self._shown = -math.inf
+
+    def __call__(self, text: str) -> None:
+        """Say it, unless something was said a moment ago."""
+        now = time.monotonic()
+        if text and now - self._shown >= LINE_S:
+            self._shown = now
+            self._console.print(text, highlight=False)
+
+
 class RunLine:
     """Progress of many runs with the time that is left, on standard error; use as a context."""
 

@@ -57,6 +57,7 @@ class Feed:
     ----------
     sectors_dropped, returns_dropped : lost here, because the console did not take them in time
     finished : no more sectors will come
+    notice : what keeps the data waiting; empty if nothing does
     failure : the sentence to show when the source or a stage failed; empty otherwise
     """
 
@@ -68,6 +69,7 @@ class Feed:
         self.sectors_dropped = 0
         self.returns_dropped = 0
         self.finished = False
+        self.notice = ""
         self.failure = ""
 
     def put(self, sector: Sector) -> None:
@@ -105,6 +107,10 @@ class Feed:
     def finish(self) -> None:
         """The source has ended."""
         self.finished = True
+
+    def say(self, notice: str) -> None:
+        """Show what keeps the data waiting."""
+        self.notice = notice
 
     def fail(self, message: str) -> None:
         """The source or a stage has failed."""

@@ -397,6 +397,8 @@ class ConsoleWindow(QMainWindow):
             return self.tr("▲ encoder stalled: the antenna does not turn"), "alarm"
         if self._trouble:
             return self._trouble, "alarm"
+        if self.feed.notice:
+            return self.feed.notice, ""
         if self.feed.finished:
             return self.tr("end of the data"), ""
         if self.controls.paused:
