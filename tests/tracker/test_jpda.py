@@ -212,3 +212,18 @@ def test_a_pair_that_is_given_twice_counts_twice():
     once = enumerate_events(np.array([[0.5, 3.0], [0.5, 1.0]]))
     assert found.p_miss == pytest.approx(once[:, 0])
     assert found.p[:2].sum() == pytest.approx(once[0, 1])
+
+
+@pytest.mark.parametrize(("tracks", "plots"), [(25, 25), (30, 70), (80, 26)])
+def test_a_full_matrix_is_approximated_as_its_pairs_are(tracks: int, plots: int) -> None:
+    rng = np.random.default_rng(tracks)
+    likelihood = np.concatenate([np.full((tracks, 1), 0.1), rng.gamma(0.3, size=(tracks, plots))], axis=1)
+    likelihood[0, 1:] *= 1e200  # a miss that is as good as impossible
+    row, col = np.repeat(np.arange(tracks), plots), np.tile(np.arange(plots), tracks)
+    pairs = jpda.sparse(likelihood[:, 0].copy(), plots, row, col, likelihood[:, 1:].ravel().copy())
+    assert pairs.approximate.all()
+    found = jpda.marginals(likelihood)
+    # Sums in another order: rounding, and what the sweeps make of it.
+    np.testing.assert_allclose(found[:, 1:].ravel(), pairs.p, atol=1e-9)
+    np.testing.assert_allclose(found.sum(axis=1), 1.0, atol=1e-12)
+    assert found[:, 1:].sum(axis=0).max() <= 1.0 + 1e-12

@@ -30,7 +30,7 @@ _CHEAP = 256.0  # steps for which it is not worth while to look for a cheaper wa
 _ratios, find = pairs.ratios, pairs.find
 _work, _plan, _eliminate = elimination.work, elimination.plan, elimination.eliminate
 _WIDEST = elimination.WIDEST
-_propagate = propagation.propagate
+_propagate, _propagate_all = propagation.propagate, propagation.propagate_all
 
 
 class Marginals(NamedTuple):
@@ -109,25 +109,28 @@ def _dense(weights: Array, budget: float, result: Array) -> bool:
     for t in range(tracks):
         gate = weights[t, 1:]
         for b in range(blocks):
-            block, count = gate[b * _BLOCK : (b + 1) * _BLOCK], 0
+            block, count, sound = gate[b * _BLOCK : (b + 1) * _BLOCK], 0, 0
             for j in range(block.size):  # without a branch: as fast as memory delivers
                 count += block[j] != 0.0
+                sound += (block[j] >= 0.0) & (block[j] < math.inf)
+            if sound < block.size:
+                return False
             some[t, b] = count
             pairs += count
-    row, col, w = np.empty(pairs, np.int64), np.empty(pairs, np.int64), np.empty(pairs)
-    miss, n = np.empty(tracks), 0
-    for t in range(tracks):
-        miss[t] = weights[t, 0]
-        if not 0.0 <= miss[t] < math.inf:
+        if not 0.0 <= weights[t, 0] < math.inf:
             return False
+    if pairs == tracks * (columns - 1) and min(tracks, columns - 1) > _WIDEST:
+        _propagate_all(weights, _sweeps(pairs), result)
+        return True
+    row, col, w = np.empty(pairs, np.int64), np.empty(pairs, np.int64), np.empty(pairs)
+    miss, n = weights[:, 0].copy(), 0
+    for t in range(tracks):
         for b in range(blocks):
             if some[t, b] == 0:
                 continue
             block = weights[t, 1 + b * _BLOCK : 1 + (b + 1) * _BLOCK]
             for j in range(block.size):
                 if block[j] != 0.0:
-                    if not 0.0 < block[j] < math.inf:
-                        return False
                     row[n], col[n], w[n] = t, b * _BLOCK + j, block[j]
                     n += 1
     p, p_miss, approximate = np.empty(n), np.empty(tracks), np.zeros(tracks, np.bool_)
@@ -265,7 +268,7 @@ def _clusters(by_track: Side, claims: Ints, budget: float, approximate: Any) -> 
     if pairs == 0:
         return
     members, begin = _components(by_track, columns)
-    left, sweeps = budget, min(_SWEEPS, max(int(_MESSAGES / pairs), 1))
+    left, sweeps = budget, _sweeps(pairs)
     if _too_wide(by_track, claims):
         left = 0.0
     by_plot, place = _by_plot(by_track, columns if left > 0.0 else 0)
@@ -295,6 +298,12 @@ def _clusters(by_track: Side, claims: Ints, budget: float, approximate: Any) -> 
         for c in plots[:n]:
             for k in range(by_plot.start[c], by_plot.start[c + 1]):
                 by_track.ratio[place[k]] = by_plot.ratio[k]
+
+
+@njit(cache=True, nogil=True)
+def _sweeps(pairs: int) -> int:
+    """How often belief propagation may go over so many pairs."""
+    return min(_SWEEPS, max(int(_MESSAGES / pairs), 1))
 
 
 @njit(cache=True, nogil=True)

@@ -8,7 +8,7 @@ import numpy as np
 from numba import njit
 
 from radar_console.estimation.gaussian import Array
-from radar_console.tracker.association.pairs import Ints, Side
+from radar_console.tracker.association.pairs import LEAST_MISS, Ints, Side
 
 CLOSE = 1e-9
 """Relative change of what the plots hear below which the messages have converged."""
@@ -69,5 +69,65 @@ def _weigh(r: Array, c: Ints, u: Array, heard: Array, weight: Array) -> float:
     total = 1.0
     for k in range(r.size):
         weight[k] = r[k] / max(heard[c[k]] - u[k], 1.0)
+        total += weight[k]
+    return total
+
+
+@njit(cache=True, nogil=True, error_model="numpy", fastmath={"reassoc", "nsz"})
+def propagate_all(weights: Array, sweeps: int, result: Array) -> bool:
+    """The same where every track gates every plot: on the matrices themselves, without lists of pairs.
+
+    Parameters
+    ----------
+    weights, result : (tracks, plots + 1)  as `jpda.marginals` takes and returns them
+    """
+    tracks, plots = weights.shape[0], weights.shape[1] - 1
+    told, heard, hears = np.zeros((tracks, plots)), np.ones(plots), np.empty(plots)
+    weight = np.empty(plots)
+    for t in range(tracks):
+        miss, gate, r = weights[t, 0], weights[t, 1:], result[t, 1:]
+        largest = max(miss, gate.max())
+        least = max(miss / largest, LEAST_MISS)
+        for k in range(plots):
+            r[k] = gate[k] / largest / least
+    converged = False
+    for _ in range(sweeps):
+        hears[:] = 1.0
+        for t in range(tracks):
+            u = told[t]
+            total = _weigh_all(result[t, 1:], u, heard, weight)
+            for k in range(plots):
+                u[k] = result[t, 1 + k] / max(total - weight[k], 1.0)
+                hears[k] += u[k]
+        change = 0.0
+        for j in range(plots):
+            change += abs(hears[j] - heard[j]) / hears[j]
+        heard, hears = hears, heard
+        if change < CLOSE:
+            converged = True
+            break
+    used = hears
+    used[:] = 0.0
+    for t in range(tracks):
+        p = result[t, 1:]
+        total = _weigh_all(p, told[t], heard, weight)
+        for k in range(plots):
+            p[k] = weight[k] / total
+            used[k] += p[k]
+    for t in range(tracks):
+        p, together = result[t, 1:], 0.0
+        for k in range(plots):
+            p[k] /= max(used[k], 1.0)
+            together += p[k]
+        result[t, 0] = max(1.0 - together, 0.0)
+    return converged
+
+
+@njit(cache=True, nogil=True, error_model="numpy", fastmath={"reassoc", "nsz"})
+def _weigh_all(r: Array, u: Array, heard: Array, weight: Array) -> float:
+    """As `_weigh`, of a track that gates all plots: a loop that runs in vectors."""
+    total = 1.0
+    for k in range(r.size):
+        weight[k] = r[k] / max(heard[k] - u[k], 1.0)
         total += weight[k]
     return total
