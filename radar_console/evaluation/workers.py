@@ -135,7 +135,7 @@ def dask(address: str) -> Workers:
             import distributed
         except ImportError:
             raise RadarConsoleError(
-                "--dask: needs the package distributed; pip install 'radar-console[cluster]'"
+                "--dask: needs the package distributed; in the project's folder: pip install '.[cluster]'"
             ) from None
         for name in ("distributed", "distributed.client", "distributed.utils", "distributed.core"):
             logging.getLogger(name).setLevel(logging.CRITICAL)  # what the user must know is said below
