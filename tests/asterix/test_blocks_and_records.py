@@ -102,7 +102,7 @@ def shaped(draw):
     return category, bytes(fspec) + bytes(body)
 
 
-@settings(max_examples=300, deadline=None)
+@settings(max_examples=300)
 @given(shaped())
 def test_items_are_those_of_libasterix(oracle, made):
     category, data = made

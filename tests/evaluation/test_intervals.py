@@ -2,17 +2,15 @@
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from scipy import stats
 
 from radar_console.evaluation import intervals
 
-unhurried = settings(deadline=None)  # how long an example takes says nothing
 numbers = st.lists(st.integers(-1000, 1000).map(float), min_size=2, max_size=30)
 
 
-@unhurried
 @given(numbers, st.sampled_from([0.5, 0.9, 0.95]))
 def test_mean_is_student_s(values, level):
     found = intervals.mean(values, level)
@@ -24,7 +22,6 @@ def test_mean_is_student_s(values, level):
         assert found.low == found.high == found.value
 
 
-@unhurried
 @given(st.integers(1, 400).flatmap(lambda n: st.tuples(st.integers(0, n), st.just(n))))
 def test_proportion_is_wilson_s(case):
     hits, runs = case
@@ -81,8 +78,8 @@ def test_differences_and_ratios_of_pairs_are_scipy_s():
 def test_they_hold_the_truth_as_often_as_they_say():
     """Of 2,000 samples of 12 runs; four standard errors of a part are 2 %.
 
-    The bootstrap of so few skewed values is not exact: the mean of 12 exponential ones is held in 91 to
-    95 %, and without the expanded quantiles in 88 %.
+    The bootstrap of so few skewed values is not exact: the mean of 12 exponential ones is held in 91 %, and
+    without the expanded quantiles in 87 %.
     """
     rng = np.random.default_rng(7)
     gaussian, skewed = rng.normal(size=(2000, 12)), rng.exponential(size=(2000, 12))
@@ -94,7 +91,7 @@ def test_they_hold_the_truth_as_often_as_they_say():
     drawn = intervals.bootstrap(intervals.average, gaussian, rng=rng, resamples=600)
     assert held(drawn, 0.0) == pytest.approx(0.95, abs=0.025)
     drawn = intervals.bootstrap(intervals.average, skewed, rng=rng, resamples=600)
-    assert 0.9 < held(drawn, 1.0) < 0.97
+    assert held(drawn, 1.0) == pytest.approx(0.91, abs=0.02)
     assert 0.92 < held(intervals.median(gaussian, rng, resamples=600), 0.0) < 1.0
 
 
@@ -108,7 +105,6 @@ def test_pairs_tell_what_single_settings_cannot():
     assert one.low < other.value < one.high
 
 
-@unhurried
 @given(st.integers(0, 2**32 - 1), st.floats(0.1, 10.0))
 def test_a_setting_beside_itself_and_beside_its_multiple(seed, factor):
     rng = np.random.default_rng(seed)

@@ -50,7 +50,7 @@ def test_what_is_written_is_read_to_the_last_bit(tmp_path):
     assert lines[1] == "7,imm,[],0.30000000000000004,,"
 
 
-@settings(deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture], max_examples=25)
+@settings(suppress_health_check=[HealthCheck.function_scoped_fixture], max_examples=25)
 @given(data=st.data())
 def test_cut_off_anywhere_it_goes_on_without_a_lost_or_doubled_run(tmp_path, data):
     """Whole rows stay, a torn one goes; doing what is missing gives the same file in the end."""

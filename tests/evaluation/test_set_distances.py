@@ -5,7 +5,7 @@ import itertools
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from scipy.optimize import linear_sum_assignment
 
@@ -17,7 +17,7 @@ C = 1000.0
 # Sums of a few terms of at most c^p, and one root: a thousand roundings at most.
 ROUNDING = 1e-12
 
-unhurried = settings(deadline=None)  # how long an example takes says nothing
+
 coordinate = st.integers(-2500, 2500).map(float)
 positions = st.lists(st.tuples(coordinate, coordinate), max_size=5).map(
     lambda rows: np.array(rows, float).reshape(-1, 2)
@@ -37,13 +37,11 @@ def by_enumeration(x, y, c, p, alpha):
     return (best + c**p / alpha * (len(y) - len(x))) ** (1 / p)
 
 
-@unhurried
 @given(positions, positions, exponent, alphas)
 def test_gospa_is_its_definition(x, y, p, alpha):
     assert float(gospa(x, y, C, p, alpha)) == pytest.approx(by_enumeration(x, y, C, p, alpha), rel=ROUNDING)
 
 
-@unhurried
 @given(positions, positions, exponent)
 def test_ospa_is_its_definition(x, y, p):
     larger = max(len(x), len(y), 1)
@@ -52,7 +50,6 @@ def test_ospa_is_its_definition(x, y, p):
 
 
 @pytest.mark.parametrize("distance", [gospa, ospa])
-@unhurried
 @given(x=positions, y=positions, z=positions, p=exponent)
 def test_axioms_of_a_metric(distance, x, y, z, p):
     def d(a, b):
@@ -66,7 +63,6 @@ def test_axioms_of_a_metric(distance, x, y, z, p):
 
 
 @pytest.mark.parametrize("distance", [gospa, ospa])
-@unhurried
 @given(
     x=positions, y=positions, turn=st.floats(-4, 4), shift=st.tuples(coordinate, coordinate), data=st.data()
 )
@@ -80,7 +76,6 @@ def test_invariances(distance, x, y, turn, shift, data):
     assert float(distance(*moved, C)) == pytest.approx(expected, abs=1e-6)
 
 
-@unhurried
 @given(positions, positions, exponent, alphas)
 def test_parts_make_the_whole(x, y, p, alpha):
     whole = gospa(x, y, C, p, alpha)
@@ -158,7 +153,6 @@ def test_large_powers():
         gospa([[0.0, 0.0]], [[3.0, 4.0]], 1e6, p=200.0)
 
 
-@unhurried
 @given(st.integers(0, 2**32 - 1), st.sampled_from([50.0, 400.0, 3000.0]))
 def test_the_sparse_assignment_is_the_whole_one(seed, c):
     rng = np.random.default_rng(seed)

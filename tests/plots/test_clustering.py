@@ -106,7 +106,7 @@ drawn = st.lists(
 
 
 @given(drawn, st.integers(1, 30), st.integers(1, 3))
-@settings(deadline=None, max_examples=150)
+@settings(max_examples=150)
 def test_any_plots_in_any_sectors(places: list[tuple[int, int, float]], step: int, gap: int) -> None:
     """About north, in one sector for each turn and in sectors of any size."""
     pulse, cell, amplitude = np.array(sorted(places), float).reshape(-1, 3).T

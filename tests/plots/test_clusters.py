@@ -51,7 +51,7 @@ places = st.lists(st.tuples(st.integers(0, 60), st.integers(0, 12)), max_size=12
 
 
 @given(places, st.integers(1, 4), st.integers(1, 30))
-@settings(deadline=None, max_examples=300)
+@settings(max_examples=300)
 def test_stream_equals_connected_components(places: list[tuple[int, int]], gap: int, step: int) -> None:
     plots = table(places)
     clusters = streamed(plots, gap, [*range(step, 61 + step, step)])
@@ -72,7 +72,7 @@ def test_noise_of_two_turns_in_sectors_of_any_size(pulses: int) -> None:
 
 
 @given(places, st.integers(1, 3), st.integers(1, 30), st.integers(4, 12))
-@settings(deadline=None, max_examples=200)
+@settings(max_examples=200)
 def test_long_clusters_are_cut_alike_in_any_sectors(
     places: list[tuple[int, int]], gap: int, step: int, longest: int
 ) -> None:

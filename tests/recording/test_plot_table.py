@@ -151,7 +151,7 @@ def test_rows_out_of_order_are_put_in_order(tmp_path):
     assert (np.diff(found["time"]) > 0).all()
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @hypothesis_given(st.lists(st.text('0123456789.,-na"\n e', max_size=20), max_size=12))
 def test_any_text_is_rows_or_a_reason(tmp_path_factory, junk):
     file = tmp_path_factory.mktemp("junk") / "plots.csv"

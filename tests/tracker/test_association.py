@@ -14,7 +14,7 @@ from radar_console.tracker.association import gnn, jpda
 from radar_console.tracker.association.choose import GNN, JPDA, KINDS, NN, PDA, associate
 
 every_kind = pytest.mark.parametrize("kind", KINDS.values(), ids=KINDS.keys())
-many = settings(max_examples=50, deadline=None, derandomize=True)
+many = settings(max_examples=50, derandomize=True)
 ROUNDING = 1e-12  # some hundred operations on numbers of at most 1
 
 
@@ -221,7 +221,7 @@ def least_cost(weights):
     return result
 
 
-@settings(max_examples=200, deadline=None, derandomize=True)
+@settings(max_examples=200, derandomize=True)
 @given(problem=problems(12, 14))
 def test_gnn_is_the_likeliest_event(problem):
     weights, _ = problem

@@ -36,7 +36,7 @@ def random_cluster(seed, tracks, plots, density, spread):
     return likelihood
 
 
-@settings(max_examples=200, deadline=None, derandomize=True)
+@settings(max_examples=200, derandomize=True)
 @given(
     st.integers(0, 2**32 - 1),
     st.integers(1, 5),
