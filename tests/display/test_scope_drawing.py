@@ -4,7 +4,7 @@ from dataclasses import fields
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from radar_console.core.units import TURN
@@ -33,7 +33,6 @@ def test_a_line_through_pixel_middles_is_sharp() -> None:
     assert ink.sum() == 10 * 255
 
 
-@settings(deadline=None)  # the first example compiles
 @given(PIXEL, PIXEL, PIXEL, PIXEL)
 def test_ink_lies_on_the_line_and_stays_on_the_screen(x0: float, y0: float, x1: float, y1: float) -> None:
     ink = drawn([x0, x1], [y0, y1])
@@ -82,7 +81,6 @@ def place(
     return chosen, np.column_stack([left, top, sizes[np.arange(count), level]])
 
 
-@settings(deadline=None)
 @given(st.lists(st.tuples(st.floats(0, 599), st.floats(0, 599)), max_size=60))
 def test_labels_never_cover_each_other_nor_leave_the_screen(symbols: list[tuple[float, float]]) -> None:
     chosen, boxes = place([x for x, _ in symbols], [y for _, y in symbols])
@@ -134,7 +132,6 @@ def test_what_is_dark_shows_what_lies_below() -> None:
     np.testing.assert_array_equal(phosphor.pixels, under)
 
 
-@settings(deadline=None)
 @given(st.floats(0.0, TURN), st.floats(0.01, 3.0))
 def test_erase_darkens_exactly_the_sector(begin: float, width: float) -> None:
     phosphor = Phosphor(64, 64, NIGHT)

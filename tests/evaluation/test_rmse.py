@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from radar_console.evaluation.rmse import rmse
@@ -14,7 +14,6 @@ def test_by_hand():
     assert found.value == pytest.approx(np.sqrt(25 / 2))
 
 
-@settings(deadline=None)  # how long an example takes says nothing
 @given(st.integers(0, 2**32 - 1), st.floats(-4.0, 4.0))
 def test_a_stack_its_parts_and_turns_of_the_plane(seed, turn):
     rng = np.random.default_rng(seed)

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from radar_console.core.messages import TRACK, TRUTH, TrackStatus, blank
@@ -176,7 +176,6 @@ def test_tracks_are_moved_on_by_their_velocity_and_never_know_the_future():
     assert [len(now.track) for now in short] == [1, 1, 1, 1, 0, 0]
 
 
-@settings(deadline=None)  # how long an example takes says nothing
 @given(st.integers(0, 2**32 - 1), st.floats(-np.pi, np.pi))
 def test_order_numbers_and_directions_do_not_matter(seed, turn):
     rng = np.random.default_rng(seed)
