@@ -102,7 +102,7 @@ def small(monkeypatch, tmp_path):
     monkeypatch.setattr(filter_rmse, "_FRAGILE", (Case("FIGHTER"),))
     monkeypatch.setattr(filter_rmse, "_PARTICLES", 50)
     monkeypatch.setattr(filter_runs, "MATCHED_COUNTS", (100, 1_000))
-    monkeypatch.setattr(filter_runs, "BOOTSTRAP", 500)
+    monkeypatch.setattr(filter_runs, "BOOTSTRAP", (500,))
     monkeypatch.setattr(resampling, "COUNTS", (100, 1_000))
     return tmp_path
 
