@@ -32,9 +32,9 @@ def curve(work: Work, scores: Sequence["Score"], ekf: float, pf: float) -> None:
             ax.plot(GRID, score.curve, color=colours[name], label=name)
             ax.plot(GRID[score.best], score.curve[score.best], "o", color=colours[name])
         levels = (
-            (ekf, "published EKF and UKF, 186.4 m"),
-            (float(scores[0].rmse["raw"].value), "no filter, 141.4 m"),
-            (pf, "published particle filter, 135.4 m"),
+            (ekf, "published EKF, UKF 186.4 m"),
+            (float(scores[0].rmse["raw"].value), "no filter 141.4 m"),
+            (pf, "published particle filter 135.4 m"),
         )
         for k, (level, text) in enumerate(levels):
             ax.axhline(level, color=INK, lw=1.0, ls=(0, (1, 2)) if k == 1 else (0, (5, 3)), zorder=1)

@@ -24,7 +24,7 @@ Filters, all started from two scans and scored from the second scan after those,
 - Particle filters with a single model, σ_a = 10 m/s², on truth from that model: they go to the KF as they
   grow.
 
-Running time: 200 runs take some six minutes on one core.
+Running time: 200 runs take some five minutes on one core.
 """
 
 from collections.abc import Sequence
