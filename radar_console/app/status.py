@@ -12,6 +12,7 @@ from radar_console.evaluation.monte_carlo import Progress as RunProgress
 
 REDRAW_S = 0.1
 LINE_S = 5.0
+NOTHING = RunProgress(0, 0, 0, 0.0)
 
 
 class StatusLine:
@@ -75,6 +76,7 @@ class RunLine:
         self._title = title
         self._console = Console(file=sys.stderr)
         self._shown = -math.inf
+        self._first: RunProgress | None = None
         self._progress = Progress(
             TextColumn("{task.description}"),
             BarColumn(),
@@ -100,7 +102,11 @@ class RunLine:
         done, total, failed, elapsed = progress
         if not total:
             return
-        rate = done / elapsed if elapsed else 0.0
+        if done and self._first is None:
+            self._first = progress
+        # The start of the workers is no part of the rate.
+        start = self._first if self._first is not None and done > self._first.done else NOTHING
+        rate = (done - start.done) / max(elapsed - start.elapsed, 1e-9)
         left = f"{clock((total - done) / rate)} left" if rate else "starting"
         text = f"{60.0 * rate:.3g} a minute, {left}" + (f", {failed} failed" if failed else "")
         if self._console.is_terminal:

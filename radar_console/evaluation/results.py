@@ -292,7 +292,7 @@ def _write(out: int, line: bytes) -> None:
 def _csv_line(fields: Iterable[str]) -> bytes:
     out = io.StringIO(newline="")
     csv.writer(out, lineterminator="\n").writerow(fields)
-    return out.getvalue().encode("utf-8")
+    return out.getvalue().encode("utf-8", "backslashreplace")
 
 
 def _one_line(text: str) -> str:

@@ -93,6 +93,8 @@ def worded(interval: Interval, signed: bool = False) -> str:
     value, low, high = (float(bound) for bound in interval[:3])
     if math.isnan(value):
         return "–"
+    if signed and value == low == high == 0.0:
+        return "0"
     sign = "+" if signed else ""
     if math.isnan(low):
         return f"{value:{sign},.4g}"
