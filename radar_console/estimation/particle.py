@@ -435,10 +435,13 @@ def cholesky(P: Array, L: Array) -> None:
     L[:] = 0.0
     for j in range(4):
         for i in range(j, 4):
-            s = P[i, j]
+            s, left = P[i, j], P[i, i]
             for k in range(j):
                 s -= L[i, k] * L[j, k]
+                left -= L[i, k] * L[i, k]
             if i == j:
                 L[i, i] = math.sqrt(max(s, 1e-12 * P[i, i], 1e-12))
             else:
-                L[i, j] = s / L[j, j]
+                # Where rounding leaves next to nothing to divide by: no more than there is of the variance.
+                most = math.sqrt(max(left, 0.0))
+                L[i, j] = min(max(s / L[j, j], -most), most)

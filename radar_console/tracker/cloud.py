@@ -274,13 +274,14 @@ def _part_copies(track: Any, key: Any, belief: Belief) -> None:
     cov, scratch = np.empty((4, 4)), np.empty((4, particles.shape[1]), np.float32)
     _turn(track.P, track.cos, track.sin, cov)
     for axis in range(2):
+        whole = cov[axis, axis] * cov[2 + axis, 2 + axis]
         cov[axis, axis] -= S[0, 0]
         cov[axis, 2 + axis] -= S[0, 1]
         cov[2 + axis, axis] -= S[0, 1]
         cov[2 + axis, 2 + axis] -= S[1, 1]
         # A cloud that rounding leaves without a spread of its own has no shape to part its copies by.
         shape = cov[axis, axis] * cov[2 + axis, 2 + axis] - cov[axis, 2 + axis] ** 2
-        if not (cov[axis, axis] > 0.0 and shape > _FLAT * track.P[axis, axis] * track.P[2 + axis, 2 + axis]):
+        if not (cov[axis, axis] > 0.0 and shape > _FLAT * whole):
             return
     _regularise(particles, cov, _KERNEL, _mix(key + np.uint64(5)), belief.table, scratch)
 
