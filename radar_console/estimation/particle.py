@@ -9,7 +9,8 @@ A particle stands for a Gaussian: all share the *rest* S (2, 2), covariance of p
 along any axis, which is what the particles leave open. The bootstrap filter [1] draws everything as it
 predicts, and S is 0. With the optimal proposal [2, §V-C] the noise of one step is open until a plot has
 come. The adapted filter leaves the velocity open for good (Rao and Blackwell): given the positions that
-were drawn it is a Gaussian, whose covariance does not depend on the measurements [3].
+were drawn it is a Gaussian, whose covariance does not depend on the measurements [3]. Of the position it
+leaves open what every posterior has, whichever plot is the target's or none; only the difference is drawn.
 
 [1] Gordon, Salmond, Smith, Novel approach to nonlinear/non-Gaussian Bayesian state estimation,
     IEE Proc. F 140(2), 1993.
@@ -116,7 +117,9 @@ TERMS = 19
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def condition(S: Array, z: Singles, R: Array, r: float, scale: float, rest: float, terms: Singles) -> float:
+def condition(
+    S: Array, z: Singles, R: Array, r: float, scale: float, rest: float, apart: float, terms: Singles
+) -> float:
     """Prepare a measurement: position of covariance `scale` R, range rate of variance `scale` r.
 
     Both are seen `lag` s after the particles' time. The position is drawn from its exact posterior;
@@ -128,7 +131,8 @@ def condition(S: Array, z: Singles, R: Array, r: float, scale: float, rest: floa
     z : (6,) the measurement
     R : (3,) aa, ab, bb, in the track's axes
     r : variance of the range rate; infinite where there is none
-    rest : variance of the velocity that the next step's particles leave open
+    rest : variance of the velocity, given the position, that the next step's particles leave open
+    apart : variance of the position that they leave open
     terms : (19,) filled; named above
 
     Returns
@@ -158,9 +162,9 @@ def condition(S: Array, z: Singles, R: Array, r: float, scale: float, rest: floa
     k = S[0, 0] + lag * S[0, 1]
     a_aa, a_ab, a_ar = k * w_aa, k * w_ba, k * w_ra + cross_a * w_rr
     a_ba, a_bb, a_br = 0.0, k * w_bb, k * w_rb + cross_b * w_rr
-    c_aa = math.sqrt(max(S[0, 0] - a_aa * a_aa - a_ab * a_ab - a_ar * a_ar, 0.0))
+    c_aa = math.sqrt(max(S[0, 0] - apart - a_aa * a_aa - a_ab * a_ab - a_ar * a_ar, 0.0))
     c_ba = -(a_aa * a_ba + a_ab * a_bb + a_ar * a_br) / c_aa if c_aa > 0.0 else 0.0
-    c_bb = math.sqrt(max(S[0, 0] - a_ba * a_ba - a_bb * a_bb - a_br * a_br - c_ba * c_ba, 0.0))
+    c_bb = math.sqrt(max(S[0, 0] - apart - a_ba * a_ba - a_bb * a_bb - a_br * a_br - c_ba * c_ba, 0.0))
     terms[W_AA], terms[W_BA], terms[W_BB] = w_aa, w_ba, w_bb
     terms[W_RA], terms[W_RB], terms[W_RR] = w_ra, w_rb, w_rr
     terms[A_AA], terms[A_AB], terms[A_AR] = a_aa, a_ab, a_ar
@@ -173,11 +177,11 @@ def condition(S: Array, z: Singles, R: Array, r: float, scale: float, rest: floa
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def condition_on_nothing(S: Array, rest: float, terms: Singles) -> None:
+def condition_on_nothing(S: Array, rest: float, apart: float, terms: Singles) -> None:
     """Prepare for the alternative that none of the measurements is the target's."""
     slope, left = given_position(S)
     terms[:] = 0.0
-    terms[C_AA] = terms[C_BB] = math.sqrt(S[0, 0])
+    terms[C_AA] = terms[C_BB] = math.sqrt(max(S[0, 0] - apart, 0.0))
     terms[SLOPE] = slope
     terms[ALONG] = terms[ACROSS] = math.sqrt(max(left - rest, 0.0))
 
@@ -255,13 +259,13 @@ def weigh(
     """
     terms = np.empty(TERMS, np.float32)
     near = np.empty(relative.size, np.float32)
-    log_near = condition(S, z, R, r, 1.0, 0.0, terms)
+    log_near = condition(S, z, R, r, 1.0, 0.0, 0.0, terms)
     _distances(particles, 0, near.size, z, terms, near)
     nearest = _least(near)
     if outliers > 0.0:
         far = np.empty(relative.size, np.float32)
         log_near += math.log(1.0 - outliers)
-        log_far = math.log(outliers) + condition(S, z, R, r, BROAD, 0.0, terms)
+        log_far = math.log(outliers) + condition(S, z, R, r, BROAD, 0.0, 0.0, terms)
         _distances(particles, 0, far.size, z, terms, far)
         shift = max(log_near - 0.5 * nearest, log_far - 0.5 * _least(far))
         total = _mixture(weights, near, far, log_near - shift, log_far - shift, relative)
@@ -431,10 +435,13 @@ def cholesky(P: Array, L: Array) -> None:
     L[:] = 0.0
     for j in range(4):
         for i in range(j, 4):
-            s = P[i, j]
+            s, left = P[i, j], P[i, i]
             for k in range(j):
                 s -= L[i, k] * L[j, k]
+                left -= L[i, k] * L[i, k]
             if i == j:
                 L[i, i] = math.sqrt(max(s, 1e-12 * P[i, i], 1e-12))
             else:
-                L[i, j] = s / L[j, j]
+                # Where rounding leaves next to nothing to divide by: no more than there is of the variance.
+                most = math.sqrt(max(left, 0.0))
+                L[i, j] = min(max(s / L[j, j], -most), most)

@@ -32,6 +32,7 @@ _Z_U, _Z_V = particle.Z_U, particle.Z_V
 # Added to the pass: random keys of what else happens in it.
 _UPDATE, _PARTING, _START = 1 << 40, 1 << 42, 1 << 41
 _KERNEL = 0.25
+OPEN_SHARE = 0.9  # of the least variance of the plots: a little is drawn along all the axes
 _FLAT = 1e-4  # of the product of the variances: a determinant below it is rounding's
 _NEARLY = 0.999  # of the velocity's variance is left open at the start: what is drawn is no singular cloud
 _SD_DOPPLER = 2.0  # m/s, where a plot does not say
@@ -273,13 +274,14 @@ def _part_copies(track: Any, key: Any, belief: Belief) -> None:
     cov, scratch = np.empty((4, 4)), np.empty((4, particles.shape[1]), np.float32)
     _turn(track.P, track.cos, track.sin, cov)
     for axis in range(2):
+        whole = cov[axis, axis] * cov[2 + axis, 2 + axis]
         cov[axis, axis] -= S[0, 0]
         cov[axis, 2 + axis] -= S[0, 1]
         cov[2 + axis, axis] -= S[0, 1]
         cov[2 + axis, 2 + axis] -= S[1, 1]
         # A cloud that rounding leaves without a spread of its own has no shape to part its copies by.
         shape = cov[axis, axis] * cov[2 + axis, 2 + axis] - cov[axis, 2 + axis] ** 2
-        if not (cov[axis, axis] > 0.0 and shape > _FLAT * track.P[axis, axis] * track.P[2 + axis, 2 + axis]):
+        if not (cov[axis, axis] > 0.0 and shape > _FLAT * whole):
             return
     _regularise(particles, cov, _KERNEL, _mix(key + np.uint64(5)), belief.table, scratch)
 
@@ -309,15 +311,16 @@ def _propose_cloud(
     for j in range(m):
         r[j] = _measure(track, pool[chosen[j]], par, Z[j], R[j])
         least_r = min(least_r, r[j])
-    _, rest = _given_position(S)
+    slope, rest = _given_position(S)
     rest = 0.0 if par.proposal != ADAPTED else rest / (1.0 + rest / least_r)
+    apart = _open_position(S, Z, R) if par.proposal == ADAPTED and least_r == math.inf else 0.0
     shaken = par.proposal != ADAPTED or least_r < math.inf
     if shaken:
         _pairs_of_normals(_mix(key + np.uint64(1)), noise[2], noise[3])
     near = np.empty(_TERMS, np.float32)
     nothing = np.zeros(_MEASURED, np.float32)
     nothing[_Z_U] = 1.0
-    _condition_on_nothing(S, rest, near)
+    _condition_on_nothing(S, rest, apart, near)
     _propose(parents, bounds[0], bounds[1], nothing, near, noise, particles)
     if shaken:
         _shake(particles, bounds[0], bounds[1], nothing, near, noise)
@@ -335,6 +338,7 @@ def _propose_cloud(
                 R[j],
                 r[j],
                 rest,
+                apart,
                 par.outliers,
                 uniform,
                 odd,
@@ -342,23 +346,37 @@ def _propose_cloud(
                 shaken,
                 particles,
             )
-    S[0, 0] = S[0, 1] = S[1, 0] = 0.0
-    S[1, 1] = rest
+    S[0, 0] = apart
+    S[0, 1] = S[1, 0] = slope * apart
+    S[1, 1] = rest + slope * slope * apart
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _open_position(S: Array, Z: Singles, R: Array) -> float:
+    """What is left open of the position's variance: less than any of the plots Z and R would leave of it."""
+    left = S[0, 0]
+    for j in range(R.shape[0]):
+        lag, half = float(Z[j, _Z_LAG]), 0.5 * (R[j, 0] - R[j, 2])
+        least = max(0.5 * (R[j, 0] + R[j, 2]) - math.hypot(half, R[j, 1]), 0.0)
+        k = S[0, 0] + lag * S[0, 1]
+        seen = k + lag * (S[0, 1] + lag * S[1, 1]) + OPEN_SHARE * least
+        left = min(left, max(S[0, 0] - k * k / seen, 0.0) if seen > 0.0 else 0.0)
+    return left
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def _propose_plot(
-    parents: Singles, lo: int, hi: int, S: Array, z: Singles, R: Array, r: float, rest: float,
+    parents: Singles, lo: int, hi: int, S: Array, z: Singles, R: Array, r: float, rest: float, apart: float,
     outliers: float, uniform: Singles, odd: Any, noise: Singles, shaken: bool, particles: Singles,
 ) -> None:  # fmt: skip
     """Draw particles `lo` to `hi` given one plot; to some of them it is an outlier."""
     near, far = np.empty(_TERMS, np.float32), np.empty(_TERMS, np.float32)
-    log_near = _condition(S, z, R, r, 1.0, rest, near)
+    log_near = _condition(S, z, R, r, 1.0, rest, apart, near)
     _propose(parents, lo, hi, z, near, noise, particles)
     if shaken:
         _shake(particles, lo, hi, z, near, noise)
     if outliers > 0.0:
-        log_far = _condition(S, z, R, r, _BROAD, rest, far)
+        log_far = _condition(S, z, R, r, _BROAD, rest, apart, far)
         log_odds = math.log((1.0 - outliers) / outliers) + log_near - log_far
         _are_outliers(parents, lo, hi, z, near, far, log_odds, uniform, odd)
         for k in range(lo, hi):

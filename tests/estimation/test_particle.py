@@ -78,23 +78,24 @@ def test_a_measurement_far_out_does_not_underflow(outliers, distance):
     assert relative.max() == pytest.approx(1.0 if outliers == 0.0 else relative.max())
 
 
-@pytest.mark.parametrize("doppler", [False, True])
-def test_a_proposed_position_has_the_posterior_of_the_pair(doppler):
+@pytest.mark.parametrize(("doppler", "apart"), [(False, 0.0), (False, 150.0), (True, 0.0)])
+def test_a_proposed_position_has_the_posterior_of_the_pair(doppler, apart):
     """200,000 children of one particle: mean within 4.5 standard errors, covariance within 1.5 %, which
-    is 4.5 times √(2/n)."""
+    is 4.5 times √(2/n). What is left open of the position, and of the velocity with it, is not drawn."""
     count, z = 200_000, measurement()
     r = RATE_VARIANCE if doppler else math.inf
     P, H, B = joint(1.0, doppler)
     x = np.array([20.0, -35.0, 6.0, 3.0])
     K = P @ H.T @ np.linalg.inv(B)
     mean = x + K @ (z[: len(H)] - H @ x)
-    cov = P - K @ H @ P
+    slope, _ = particle.given_position(S)
+    cov = P - K @ H @ P - np.kron(apart * np.array([[1.0, slope], [slope, slope * slope]]), np.eye(2))
     parents = np.tile(x.astype(np.float32)[:, None], count)
     noise, cloud = np.empty((4, count), np.float32), np.empty((4, count), np.float32)
     draws.pairs_of_normals(key(1, 1, 1), noise[0], noise[1])
     draws.pairs_of_normals(key(1, 1, 2), noise[2], noise[3])
     terms = np.empty(TERMS, np.float32)
-    particle.condition(S, z, PACKED, r, 1.0, 0.0, terms)
+    particle.condition(S, z, PACKED, r, 1.0, 0.0, apart, terms)
     particle.propose(parents, 0, count, z, terms, noise, cloud)
     particle.shake(cloud, 0, count, z, terms, noise)
     found = cloud.astype(float)
@@ -110,10 +111,10 @@ def test_a_proposed_position_has_the_posterior_of_the_pair(doppler):
 def test_what_is_left_open_is_not_drawn():
     terms = np.empty(TERMS, np.float32)
     _, left = particle.given_position(S)
-    particle.condition(S, measurement(), PACKED, math.inf, 1.0, left, terms)
+    particle.condition(S, measurement(), PACKED, math.inf, 1.0, left, 0.0, terms)
     assert terms[ALONG] == terms[ACROSS] == terms[RATE_GAIN] == 0.0
     rest = left * RATE_VARIANCE / (left + RATE_VARIANCE)
-    particle.condition(S, measurement(), PACKED, RATE_VARIANCE, 1.0, rest, terms)
+    particle.condition(S, measurement(), PACKED, RATE_VARIANCE, 1.0, rest, 0.0, terms)
     assert terms[ALONG] == pytest.approx(0.0, abs=1e-3 * math.sqrt(left))
     assert terms[ACROSS] == pytest.approx(math.sqrt(left - rest))
 
@@ -122,10 +123,10 @@ def test_with_nothing_open_a_proposal_moves_nothing():
     cloud, _ = some_cloud(50)
     out, noise = np.empty_like(cloud), np.ones((4, 50), np.float32)
     terms = np.empty(TERMS, np.float32)
-    particle.condition(np.zeros((2, 2)), measurement(), PACKED, math.inf, 1.0, 0.0, terms)
+    particle.condition(np.zeros((2, 2)), measurement(), PACKED, math.inf, 1.0, 0.0, 0.0, terms)
     particle.propose(cloud, 0, 50, measurement(), terms, noise, out)
     assert np.array_equal(out, cloud)
-    particle.condition_on_nothing(np.zeros((2, 2)), 0.0, terms)
+    particle.condition_on_nothing(np.zeros((2, 2)), 0.0, 0.0, terms)
     particle.propose(cloud, 0, 50, np.zeros(MEASURED, np.float32), terms, noise, out)
     assert np.array_equal(out, cloud)
 
@@ -135,8 +136,8 @@ def test_outliers_are_found_as_often_as_they_are():
     count, z, epsilon = 100_000, measurement(a=120.0), 0.1
     parents = np.zeros((4, count), np.float32)
     near, far = np.empty(TERMS, np.float32), np.empty(TERMS, np.float32)
-    log_near = particle.condition(S, z, PACKED, math.inf, 1.0, 0.0, near)
-    log_far = particle.condition(S, z, PACKED, math.inf, particle.BROAD, 0.0, far)
+    log_near = particle.condition(S, z, PACKED, math.inf, 1.0, 0.0, 0.0, near)
+    log_far = particle.condition(S, z, PACKED, math.inf, particle.BROAD, 0.0, 0.0, far)
     uniform, found = np.empty(count, np.float32), np.zeros(count, np.bool_)
     draws.uniforms(key(2, 2, 2), uniform)
     log_odds = math.log((1.0 - epsilon) / epsilon) + log_near - log_far
