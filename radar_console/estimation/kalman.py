@@ -100,3 +100,17 @@ def update_in_place(x: Array, P: Array, z: Array, R: Array, lag: Array, beta: Ar
             P[k, i] = P[i, k]
     for i in range(4):
         x[i] += mean[i]
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def condition_in_place(x: Array, P: Array, e: float, n: float, ee: float, en: float, nn: float) -> None:
+    """Condition one track, x (4,) and P (4, 4), on its position: e, n with covariance ee, en, nn."""
+    s_ee, s_en, s_nn = P[0, 0] + ee, P[0, 1] + en, P[1, 1] + nn
+    det = s_ee * s_nn - s_en * s_en
+    de, dn = e - x[0], n - x[1]
+    p0, p1 = P[:, 0].copy(), P[:, 1].copy()
+    for i in range(4):
+        k0, k1 = (s_nn * p0[i] - s_en * p1[i]) / det, (s_ee * p1[i] - s_en * p0[i]) / det
+        x[i] += k0 * de + k1 * dn
+        for j in range(4):
+            P[i, j] -= k0 * p0[j] + k1 * p1[j]

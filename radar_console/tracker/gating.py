@@ -5,12 +5,13 @@ from typing import Any
 
 from numba import njit
 
-from radar_console.tracker.records import STARTER
+from radar_console.tracker.records import CONFIRMED, STARTER
 
 MARGIN = math.radians(0.05)
 _TURN = 2.0 * math.pi
 _SPEED_SIGMAS = 2.0
 _SURE_SIGMAS = 4.5
+_DENSE_LIMIT = 9.21  # γ for 99 %: plots farther off in dense clutter say less for a target than a miss
 
 
 def threshold(probability: float) -> float:
@@ -71,6 +72,13 @@ def extent(
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
+def limit(track: Any, par: Any) -> float:
+    """γ of the track's gate; less for a young one in dense clutter, where every plot makes a branch."""
+    gate: float = par.gate
+    return min(gate, _DENSE_LIMIT) if track.dense and track.level != CONFIRMED else gate
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
 def look(track: Any, beam: Any, par: Any) -> tuple[float, float]:
     """Set the track's beam phase and its gate's extent; until which beam angle and time it can sleep."""
     T = max(beam.t - track.t, 0.0)
@@ -84,7 +92,7 @@ def look(track: Any, beam: Any, par: Any) -> tuple[float, float]:
         reach = start_reach(track, T, noise, par)
         h, along = (math.asin(reach / r), reach) if reach < r else (math.pi, math.inf)
     else:
-        gamma = 2.0 * par.gate if par.rectangle else par.gate  # of the ellipse around the rectangle
+        gamma = limit(track, par) * (2.0 if par.rectangle else 1.0)  # of the ellipse around the rectangle
         h, along = extent(de, dn, ee, en, nn, track.sd_range, track.sd_azimuth, gamma)
     track.half_width, track.along = h, along
     ahead = -h - MARGIN - track.rho
@@ -146,6 +154,7 @@ def density(track: Any, plot: Any, par: Any) -> float:
     de, dn, ee, en, nn = innovation(track, T, plot, 1.0)
     det = ee * nn - en * en
     d2 = (nn * de * de - 2.0 * en * de * dn + ee * dn * dn) / det
+    gate = limit(track, par)
     if par.rectangle:
         # Along and across the line of sight.
         s_e, s_n = plot.e - plot.s_e, plot.n - plot.s_n
@@ -154,9 +163,9 @@ def density(track: Any, plot: Any, par: Any) -> float:
         uu = u_e * u_e * ee + 2.0 * u_e * u_n * en + u_n * u_n * nn
         ww = u_n * u_n * ee - 2.0 * u_e * u_n * en + u_e * u_e * nn
         along, across = u_e * de + u_n * dn, u_n * de - u_e * dn
-        if not (along * along <= par.gate * uu and across * across <= par.gate * ww):
+        if not (along * along <= gate * uu and across * across <= gate * ww):
             return 0.0
-    elif not d2 <= par.gate:
+    elif not d2 <= gate:
         return 0.0
     if track.level == STARTER and math.hypot(de, dn) > start_reach(track, T, plot.ee + plot.nn, par):
         return 0.0

@@ -38,7 +38,7 @@ _height, _begin_height, _learn = height.predicted, height.begin, identity.learn
 _TURN = 2.0 * math.pi
 FIRST_SCORE = math.log(0.1 / 0.9)  # one plot in ten is a new target's
 _FIRST_SCORE = FIRST_SCORE
-_DROP = 4.6  # of the score from its peak, after which a young track is given up: odds of 1 to 100
+DROP = 4.6  # of the score from its peak, after which a young track is given up: odds of 1 to 100
 _DENSER = math.log(10.0)  # what dense clutter adds to the score that confirms
 _DOUBT = 0.1  # and more for each pass: what an error of the density by a tenth adds to a false score
 _LEAST_HITS = 3
@@ -247,7 +247,7 @@ def _proven(track: Any, par: Any) -> bool:
 def _hopeless(track: Any, par: Any) -> bool:
     """The young track will not be confirmed."""
     if by_score(track, par):
-        return bool(track.score < track.peak - _DROP)
+        return bool(track.score < track.peak - DROP)
     return bool(_recent_hits(track) + max(par.confirm_passes - track.passes, 0) < par.confirm_hits)
 
 

@@ -159,7 +159,7 @@ def _gate(beam: Any, queue: Any, w: World) -> bool:
     need[N_EDGES], need[N_POOL] = count, first + n
     need[N_TRACKS] = size[N_TRACKS] + count + first + n
     need[N_ROWS] = size[N_ROWS] + opened + 2 * (count + first + n) + _purged(need[N_TRACKS], par)
-    need[N_SLOTS] = size[N_SLOTS] + opened
+    need[N_SLOTS] = size[N_SLOTS] + min(opened + count, first + n)  # a plot confirms one at most
     need[N_MEMBERS] = opened
     need[N_PAST] = size[N_PAST] + n
     if (

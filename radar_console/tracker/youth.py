@@ -2,9 +2,14 @@
 
 A plot that no confirmed track used starts a track. At its second plot it branches: every plot in
 its gate makes a pair of its own, with its own likelihood, so a wrong one costs nothing but itself.
-From the third plot on each branch is a Kalman filter with probabilistic data association, and its
-score, the log-likelihood ratio of a target against clutter, grows by ln(w_0 + Σ w). Young tracks
-share plots; those that come to the same last two plots are one.
+From the third plot on a branch in sparse clutter is a Kalman filter with probabilistic data
+association, whose score, the log-likelihood ratio of a target against clutter, grows by
+ln(w_0 + Σ w); young tracks share plots, and those that come to the same last two plots are one.
+
+In dense clutter the mean of all plots in the gate soon follows none of them. There a track branches
+at every plot, and what comes to nearly the same state on one plot is one again: its likelihood is
+the sum of the ways that led there. On each plot the likeliest few states go on, so that all
+branches together are a beam search for the mixture that is the target's posterior.
 """
 
 import math
@@ -15,7 +20,7 @@ from numba import njit
 
 from radar_console.core.messages import TrackStatus
 from radar_console.estimation import particle
-from radar_console.estimation.kalman import predict_in_place, update_in_place
+from radar_console.estimation.kalman import condition_in_place, predict_in_place, update_in_place
 from radar_console.tracker import clusters, clutter, gating, height, management, order
 from radar_console.tracker.records import (
     AUTO,
@@ -29,6 +34,7 @@ from radar_console.tracker.records import (
     N_EDGES,
     N_OPEN,
     N_POOL,
+    N_SLOTS,
     N_TRACKS,
     STARTER,
     TENTATIVE,
@@ -36,16 +42,19 @@ from radar_console.tracker.records import (
 )
 
 _BROAD = particle.BROAD
-_density_of, _MARGIN = gating.density_of, gating.MARGIN
+_density_of, _predicted, _MARGIN = gating.density_of, gating.predicted, gating.MARGIN
 _density_at, _doubted = clutter.density_at, clutter.doubted
 _evidence, _update_height = clusters.evidence, height.update
 _serve, _begin, _kill, _report = management.serve, management.begin, management.kill, management.report
-_confirm, _ascending = management.confirm, order.ascending
-_DELETED = int(TrackStatus.DELETED)
+_confirm, _DROP, _ascending = management.confirm, management.DROP, order.ascending
+_TENTATIVE, _DELETED = int(TrackStatus.TENTATIVE), int(TrackStatus.DELETED)
 _PRUNE = 1e-3  # of the miss: a pair that is less likely is no pair
 _NOBODY, _HELD = -2, -3  # marks of a plot: no track waits for it; some do
 _DENSE = 0.3  # false plots in the gate of a track's second plot, from which on clutter counts as dense
 _MOST_ENDS = 8  # branches that may end on one plot
+_SAME = 4.0  # squared Mahalanobis distance of states, below which two branches are one
+_APART = 25.0  # the same of positions, from which on a young track is not a confirmed one's target
+_TRIAL = 2.2  # of the score, which a pair in dense clutter may lose: there are others
 _PURGE = 0.95  # of the capacity is left when it was exceeded
 
 
@@ -72,14 +81,14 @@ def settle(beam: Any, w: World, final: bool) -> None:
                     k = edges[k].next
                 if waits:
                     continue
-            if level == TENTATIVE:
-                _settle_tentative(index, beam, w)
+            if level == STARTER or _branches(track, w.par):
+                _settle_branching(index, beam, w)
             else:
-                _settle_starter(index, beam, w)
+                _settle_alone(index, beam, w)
 
 
 @njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
-def _settle_tentative(index: int, beam: Any, w: World) -> None:
+def _settle_alone(index: int, beam: Any, w: World) -> None:
     """Probabilistic data association of one track by itself."""
     track, pool, edges, par = w.tracks[index], w.pool, w.edges, w.par
     count, k = 0, track.first
@@ -148,40 +157,44 @@ def _update_tentative(track: Any, beta: Any, chosen: Any, pool: Any, par: Any) -
 
 
 @njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
-def _settle_starter(index: int, beam: Any, w: World) -> None:
-    """Branch: each plot in the gate makes a pair; the likeliest one is reported on.
+def _settle_branching(index: int, beam: Any, w: World) -> None:
+    """Branch: each plot in the gate makes a track of its own; the likeliest one is reported on.
 
-    The starter itself goes on as the branch whose target was missed, except in dense clutter,
-    where its ever wider gate would only gather what later plots start again.
+    The track itself goes on as the branch whose target was missed. Not so a starter in dense
+    clutter: its ever wider gate would only gather what later plots start again.
     """
     tracks, pool, edges, par = w.tracks, w.pool, w.edges, w.par
     track = tracks[index]
     best, value, k = -1, 0.0, track.first
     while k >= 0:
-        plot = pool[edges[k].plot]
+        plot, weight = pool[edges[k].plot], 0.0
+        # A plot that a confirmed track still waits for is left to it.
         if plot.weight >= 0.5 and not plot.awaited:
             weight = par.p_d / _doubted(track, plot, par) * edges[k].density
-            weight *= _evidence(track, plot, par)
+            weight *= plot.weight * _evidence(track, plot, par)
             if weight > value:
                 best, value = k, weight
+        edges[k].density = weight
         k = edges[k].next
     miss = 1.0 - par.p_d * par.p_g
-    if best >= 0:
-        _branch(index, best, value, track.voiced, beam, w)
+    least = _PRUNE * miss
+    if track.level == TENTATIVE:
+        least = math.exp(track.peak - _DROP - track.score)
+    if value > least:
+        _branch(index, best, track.voiced, beam, w)
         k = track.first
         while k >= 0:
-            plot = pool[edges[k].plot]
-            if k != best and plot.weight >= 0.5 and not plot.awaited:
-                weight = par.p_d / _doubted(track, plot, par) * edges[k].density
-                weight *= _evidence(track, plot, par)
-                if weight > _PRUNE * miss:
-                    _branch(index, k, weight, False, beam, w)
+            if k != best and edges[k].density > least:
+                _branch(index, k, False, beam, w)
             k = edges[k].next
         track.voiced = False
-        if _branches(track, par):
-            _kill(track, index, w.books)
-            return
     track.score += math.log(max(miss, 1e-300))
+    lost = track.score < track.peak - _DROP
+    if track.level == STARTER:
+        lost = value > least and _branches(track, par)
+    if lost and not track.voiced:
+        _kill(track, index, w.books)
+        return
     _serve(track, index, False, False, pool[0], math.nan, False, beam, par, w.books)
 
 
@@ -191,18 +204,37 @@ def _branches(track: Any, par: Any) -> bool:
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _branch(index: int, k: int, weight: float, voiced: bool, beam: Any, w: World) -> None:
-    """A tentative track from a starter and the plot of edge `k`, with likelihood ratio `weight`."""
-    child = w.books.size[N_TRACKS]
+def _branch(index: int, k: int, voiced: bool, beam: Any, w: World) -> None:
+    """A tentative track from another and the plot of edge `k`, whose likelihood ratio is its density."""
+    child, edge = w.books.size[N_TRACKS], w.edges[k]
     w.books.size[N_TRACKS] += 1
     w.tracks[child] = w.tracks[index]
-    track, chosen = w.tracks[child], w.edges[k].plot
+    track, chosen = w.tracks[child], edge.plot
+    track.score += math.log(edge.density)
+    if track.level == STARTER:
+        # In dense clutter it is given up as if it had been likelier once.
+        track.peak = track.score + (_DROP - _TRIAL if track.dense else 0.0)
     track.level, track.voiced, track.first, track.claims = TENTATIVE, voiced, -1, False
-    track.score += math.log(weight)
-    track.peak = track.score
-    _update_tentative(track, np.ones(1), np.full(1, chosen), w.pool, w.par)
+    if track.dense:  # where an outlier is as good as a false plot
+        _take(track, chosen, w.pool, w.par)
+    else:
+        _update_tentative(track, np.ones(1), np.full(1, chosen), w.pool, w.par)
     _serve(track, child, True, True, w.pool[chosen], 1.0, False, beam, w.par, w.books)
     track.served = track.swept = False
+    if track.hits > 2:
+        edge.track, edge.spent = child, True
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _take(track: Any, chosen: int, pool: Any, par: Any) -> None:
+    """The Kalman update with the plot `chosen` of `pool`."""
+    plot = pool[chosen]
+    t = max(plot.t, track.t)
+    predict_in_place(track.x, track.P, t - track.t, par.q)
+    track.t = t
+    condition_in_place(track.x, track.P, plot.e, plot.n, plot.ee, plot.en, plot.nn)
+    if math.isfinite(plot.up):
+        _update_height(track, pool, np.full(1, chosen), np.ones(1), par.up_q)
 
 
 @njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
@@ -248,8 +280,9 @@ def retire(beam: Any, w: World) -> None:
 def _merge(plot: Any, beam: Any, w: World) -> bool:
     """Settle which of the tracks that end on a plot go on; True if one of them was confirmed by it.
 
-    Of young tracks whose last two plots are the same the likeliest one stays. The likeliest proven
-    one is confirmed, and where a confirmed track ends, the young ones go.
+    The likeliest proven one is confirmed, and where a confirmed track ends, the young ones go. Else
+    the young ones are thinned out: branches in nearly the same state are made one; of others whose
+    last two plots are the same the likeliest stays.
     """
     edges, tracks = w.edges, w.tracks
     count, k, winner = 0, plot.head, -1
@@ -263,6 +296,12 @@ def _merge(plot: Any, beam: Any, w: World) -> bool:
         if track.last == plot.ordinal and track.misses == 0 and not track.dead:
             ends[n] = index
             n += 1
+            if track.proven and _branches(track, w.par) and _is_known(track, w):
+                track.proven = False
+                if track.voiced:
+                    _report(
+                        track, _TENTATIVE, True, True, plot, track.probability, False, track.t, w.par, w.books
+                    )
             if (track.level == CONFIRMED or track.proven) and (winner < 0 or _before(index, winner, w)):
                 winner = index
         k = edges[k].next
@@ -275,34 +314,117 @@ def _merge(plot: Any, beam: Any, w: World) -> bool:
         return True
     for i in range(n):
         stays = ends[i]
-        if tracks[stays].dead or tracks[stays].previous < 0:
+        track = tracks[stays]
+        if track.dead or track.previous < 0 or _branches(track, w.par):
             continue
         for j in range(n):
             same = not tracks[ends[j]].dead and tracks[ends[j]].previous == tracks[stays].previous
             if same and _before(ends[j], stays, w):
                 stays = ends[j]
         _absorb(stays, ends[:n], True, w)
-    _keep_best(ends[:n], w)
+    _pool(ends[:n], w)
     return False
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _keep_best(ends: Any, w: World) -> None:
-    """Of the tracks with three plots or more that end on one plot only the likeliest go on."""
+def _is_known(track: Any, w: World) -> bool:
+    """A confirmed track may be the young one's target: it waits until they are apart, or it has faded."""
+    for slot in range(w.books.size[N_SLOTS]):
+        other = w.tracks[w.belief.owner[slot]]
+        if other.dead:
+            continue
+        e, n, ee, en, nn = _predicted(other, max(track.t - other.t, 0.0))
+        de, dn = e - track.x[0], n - track.x[1]
+        ee, en, nn = ee + track.P[0, 0], en + track.P[0, 1], nn + track.P[1, 1]
+        if nn * de * de - 2.0 * en * de * dn + ee * dn * dn < _APART * (ee * nn - en * en):
+            return True
+    return False
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _drop(index: int, w: World) -> None:
+    """Give up a young track for another one's sake."""
+    track = w.tracks[index]
+    if track.voiced:
+        _report(track, _DELETED, False, False, w.pool[0], math.nan, False, track.t, w.par, w.books)
+        w.books.tally[C_MERGED] += 1
+    _kill(track, index, w.books)
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _pool(ends: Any, w: World) -> None:
+    """Of the tracks with three plots or more that end on one plot only the likeliest go on.
+
+    A branch in nearly the same state as a likelier one is not lost: the two are made one.
+    """
     score, index, n = np.empty(ends.size), np.empty(ends.size, np.int64), 0
     for i in ends:
         track = w.tracks[i]
         if not track.dead and track.hits > 2:
             score[n], index[n] = -track.score, i
             n += 1
-    if n <= _MOST_ENDS:
+    if n < 2:
         return
-    for k in _ascending(score[:n])[_MOST_ENDS:]:
-        track = w.tracks[index[k]]
-        if track.voiced:
-            _report(track, _DELETED, False, False, w.pool[0], math.nan, False, track.t, w.par, w.books)
-            w.books.tally[C_MERGED] += 1
-        _kill(track, index[k], w.books)
+    kept, roots, m = np.empty(_MOST_ENDS, np.int64), np.empty((_MOST_ENDS, 4, 4)), 0
+    for k in _ascending(score[:n]):
+        b, into = w.tracks[index[k]], -1
+        if _branches(b, w.par):
+            for j in range(m):
+                a = w.tracks[kept[j]]
+                if _branches(a, w.par) and a.t == b.t and _distance(a.x, roots[j], b.x) < _SAME:
+                    into = j
+                    break
+        if into >= 0:
+            a = w.tracks[kept[into]]
+            _blend(a, b)
+            if b.voiced and not a.voiced:
+                a.id, a.born, a.voiced, b.voiced = b.id, b.born, True, False
+        elif m < _MOST_ENDS:
+            kept[m] = index[k]
+            _root(b.P, roots[m])
+            m += 1
+            continue
+        _drop(index[k], w)
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _root(P: Any, L: Any) -> None:
+    """Cholesky's root L (4, 4) of P, its diagonal inverted."""
+    for i in range(4):
+        for j in range(i + 1):
+            s = P[i, j]
+            for k in range(j):
+                s -= L[i, k] * L[j, k]
+            L[i, j] = s * L[j, j] if j < i else 1.0 / math.sqrt(max(s, 1e-12))
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _distance(x: Any, L: Any, y: Any) -> float:
+    """Squared Mahalanobis distance of the states x and y (4,); L is the covariance's root."""
+    z, d2 = np.empty(4), 0.0
+    for i in range(4):
+        s = y[i] - x[i]
+        for j in range(i):
+            s -= L[i, j] * z[j]
+        z[i] = s * L[i, i]
+        d2 += z[i] * z[i]
+    return d2
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _blend(a: Any, b: Any) -> None:
+    """Let `a` be the mixture of itself and the less likely `b`, by its first two moments."""
+    odds = math.exp(b.score - a.score)
+    part = odds / (1.0 + odds)
+    d = np.empty(4)
+    for i in range(4):
+        d[i] = b.x[i] - a.x[i]
+    for i in range(4):
+        a.x[i] += part * d[i]
+        for j in range(4):
+            a.P[i, j] += part * (b.P[i, j] - a.P[i, j]) + part * (1.0 - part) * d[i] * d[j]
+    a.score += math.log1p(odds)
+    a.peak = max(a.peak, a.score)
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -328,10 +450,8 @@ def _absorb(stays: int, ends: Any, same: bool, w: World) -> None:
         b = w.tracks[index]
         if index == stays or b.dead or b.level == CONFIRMED or (same and b.previous != a.previous):
             continue
-        if b.voiced and b.id != heir:
-            _report(b, _DELETED, False, False, w.pool[0], math.nan, False, b.t, w.par, w.books)
-            w.books.tally[C_MERGED] += 1
-        _kill(b, index, w.books)
+        b.voiced &= b.id != heir
+        _drop(index, w)
     if heir >= 0:
         a.id, a.born, a.voiced = heir, born, True
 

@@ -54,9 +54,12 @@ def test_the_compiled_steps_are_the_batched_ones():
         assert np.allclose(P, expected.cov, rtol=1e-12)
         z, R = rng.normal(size=2), np.array([[2.0, 0.3], [0.3, 1.0]])
         expected, _ = kalman.update(expected, z, H, R)
+        alone = x.copy(), P.copy()
         kalman.update_in_place(x, P, z[None], np.array([[2.0, 0.3, 1.0]]), np.zeros(1), np.ones(1))
-        assert np.allclose(x, expected.mean, rtol=0, atol=1e-10)
-        assert np.allclose(P, expected.cov, rtol=0, atol=1e-9)
+        kalman.condition_in_place(*alone, *z, 2.0, 0.3, 1.0)
+        for mean, cov in ((x, P), alone):
+            assert np.allclose(mean, expected.mean, rtol=0, atol=1e-10)
+            assert np.allclose(cov, expected.cov, rtol=0, atol=1e-9)
 
 
 def test_alternatives_are_the_collapsed_mixture():

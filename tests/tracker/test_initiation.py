@@ -4,12 +4,25 @@ import math
 
 import numpy as np
 import pytest
-from scenes import RADAR, Scene, held, of_track, one_turn, run, settings, sound, swarm, table_of, target_of
+from scenes import (
+    RADAR,
+    Scene,
+    held,
+    of_track,
+    one_turn,
+    run,
+    same,
+    settings,
+    sound,
+    swarm,
+    table_of,
+    target_of,
+)
 
-from radar_console.core.messages import TrackStatus
+from radar_console.core.messages import Radar, TrackStatus
 from radar_console.core.units import TURN
-from radar_console.tracker import Tracker
-from radar_console.tracker.records import N_TRACKS
+from radar_console.tracker import Tracker, youth
+from radar_console.tracker.records import N_TRACKS, STATE
 
 MODES = ["auto", "m-of-n", "score", "branching"]
 
@@ -178,3 +191,62 @@ def test_capacity_takes_the_least_likely_young_tracks(crowd):
 
 def test_without_too_many_tracks_none_is_capped(crowd):
     assert run(crowd.sectors())[1].capped == 0
+
+
+THICK = {"clutter_per_km2": None, "process_noise_m2ps3": 1.0, "particles": 50}
+
+
+@pytest.fixture(scope="module")
+def thicket():
+    """A target whose gate has a false plot in it at almost every turn: 6.7 in each square kilometre.
+
+    Half of a filter's plots would be false, and the mean of all of them follows none.
+    """
+    radar = Radar("fine", rotation=4.0, max_range=300e3, sd_range=50.0, sd_azimuth=math.radians(0.06))
+    return Scene(
+        np.array([(-15e3, 90e3, 150.0, 90.0)]), turns=70, disc=(1.5e3, 6.7 * math.pi * 1.5**2), radar=radar
+    )
+
+
+def test_a_target_in_a_thicket_is_found(thicket):
+    """Its evidence is the sum over the ways through the plots; no false track comes with it."""
+    rows, counts = run(thicket.sectors(16), **THICK)
+    assert counts.confirmed == 1
+    assert {target_of(rows, thicket, track) for track in held(rows)} == {0}
+
+
+def test_branches_do_not_depend_on_the_cut(thicket):
+    reference, counts = run(thicket.sectors(16), **THICK)
+    for pushes in (1, 100):
+        rows, again = run(thicket.sectors(pushes), **THICK)
+        assert same(rows, reference)
+        assert again == counts
+
+
+def test_branches_in_one_state_add_up():
+    """The blend is the mixture of the two by its first two moments, and its likelihood their sum."""
+    rng = np.random.default_rng(4)
+    pair = np.zeros(2, STATE)
+    for track in pair:
+        root = rng.normal(size=(4, 4))
+        track["x"], track["P"] = rng.normal(size=4), root @ root.T
+    pair["score"] = 1.5, 0.2
+    a, b = pair.copy()
+    youth._blend(pair[0], pair[1])
+    part = 1.0 / (1.0 + math.exp(1.3))
+    mean = (1.0 - part) * a["x"] + part * b["x"]
+    cov = sum(
+        p * (track["P"] + np.outer(track["x"] - mean, track["x"] - mean))
+        for p, track in ((1.0 - part, a), (part, b))
+    )
+    np.testing.assert_allclose(pair["x"][0], mean, rtol=1e-12)
+    np.testing.assert_allclose(pair["P"][0], cov, rtol=1e-12)
+    assert pair["score"][0] == pytest.approx(np.logaddexp(1.5, 0.2))
+
+
+def test_the_distance_of_states():
+    rng = np.random.default_rng(5)
+    A, x, y, L = rng.normal(size=(4, 4)), rng.normal(size=4), rng.normal(size=4), np.zeros((4, 4))
+    P = A @ A.T
+    youth._root(P, L)
+    assert youth._distance(x, L, y) == pytest.approx((x - y) @ np.linalg.solve(P, x - y))
