@@ -328,11 +328,16 @@ def _merge(plot: Any, beam: Any, w: World) -> bool:
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def _is_known(track: Any, w: World) -> bool:
-    """A confirmed track may be the young one's target: it waits until they are apart, or it has faded."""
+    """A confirmed track may be the young one's target: it waits until they are apart, or it has faded.
+
+    Branches of one first plot share what had been found before they parted.
+    """
     for slot in range(w.books.size[N_SLOTS]):
         other = w.tracks[w.belief.owner[slot]]
         if other.dead:
             continue
+        if other.born == track.born:
+            return True
         e, n, ee, en, nn = _predicted(other, max(track.t - other.t, 0.0))
         de, dn = e - track.x[0], n - track.x[1]
         ee, en, nn = ee + track.P[0, 0], en + track.P[0, 1], nn + track.P[1, 1]

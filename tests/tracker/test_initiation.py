@@ -223,6 +223,24 @@ def test_branches_do_not_depend_on_the_cut(thicket):
         assert again == counts
 
 
+@pytest.mark.parametrize("angle", [1.0, 4.0])
+def test_branches_of_a_rotated_scene_are_the_same(thicket, angle):
+    """Which of them go on, and what they become together, is no matter of their order."""
+    # The map of clutter does not turn with the scene: its cells are fixed.
+    never = THICK | {"confirm_score": 1e6, "clutter_per_km2": 6.7}
+    scene = Scene(thicket.targets, turns=15, disc=thicket.disc, radar=thicket.radar)
+    a, counts = run(scene.sectors(), **never)
+    b, _ = run(scene.sectors(rotate=angle), **never)
+    assert counts.merged > 100
+    # The rotated stream ends elsewhere in the last turn.
+    a, b = (np.sort(rows[rows["hit"] & (rows["time"] < 55)], order=["track", "plot"]) for rows in (a, b))
+    assert np.array_equal(a["track"], b["track"])
+    assert np.array_equal(a["plot"], b["plot"])
+    c, s = math.cos(angle), math.sin(angle)
+    assert np.abs(b["east"] - (c * a["east"] + s * a["north"])).max() < 1e-6
+    assert np.abs(b["north"] - (c * a["north"] - s * a["east"])).max() < 1e-6
+
+
 def test_branches_in_one_state_add_up():
     """The blend is the mixture of the two by its first two moments, and its likelihood their sum."""
     rng = np.random.default_rng(4)
