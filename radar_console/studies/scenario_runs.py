@@ -3,9 +3,9 @@
 Run k of seed s plays the scenario with seed s + k, as `evaluation` does.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -65,7 +65,7 @@ def several(work: Work, title: str, names: Sequence[str], size: int = 1) -> dict
 
 def one(work: Work, name: str, seed: int) -> Picture:
     """One run of a scenario, to be drawn."""
-    (arrays,) = work.do(f"{name}, one run", [Part(pictured, (shipped(name), seed))])
+    arrays: Mapping[str, Any] = work.do(f"{name}, one run", [Part(pictured, (shipped(name), seed))])[0]
     return Picture(arrays["truth"], arrays["tracks"], arrays["seen"])
 
 
@@ -82,7 +82,7 @@ def scored(run: ScenarioRun, runs: range, seed: int) -> Arrays:
     return _together([_one_scored(run, seed + number) for number in runs])
 
 
-def pictured(run: ScenarioRun, seed: int) -> Arrays:
+def pictured(run: ScenarioRun, seed: int) -> dict[str, Any]:
     """Truth, tracks and centroids of a run."""
     chain = Chain(run.opened({}, seed), tracker_threads=1)
     tracks, seen = [np.empty(0, TRACK)], [np.empty((0, 2))]

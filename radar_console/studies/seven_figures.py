@@ -53,14 +53,14 @@ def whole(work: Work, picture: Picture, tracks: Sequence[Table], met: Sequence["
             place = np.array([last["east"], last["north"]]) / 1e3
             ax.annotate(
                 "",
-                place + 2.5 * ahead / np.linalg.norm(ahead),
-                place,
+                _point(place + 2.5 * ahead / np.linalg.norm(ahead)),
+                _point(place),
                 arrowprops={"arrowstyle": "-|>", "color": COLOURS[number], "lw": 1.6},
             )
             ax.annotate(
                 str(number + 1),
                 (rows["east"][0] / 1e3, rows["north"][0] / 1e3),
-                -11.0 * _begin(rows),
+                _point(-11.0 * _begin(rows)),
                 textcoords="offset points",
                 color=COLOURS[number],
                 weight="bold",
@@ -97,6 +97,10 @@ def _bars(ax: Axes, names: Sequence[str], figures: Sequence[Interval], colour: s
     ax.tick_params(axis="y", length=0)
     ax.grid(axis="y", visible=False)
     ax.set_ylim(-0.6, len(names) - 0.4)
+
+
+def _point(place: np.ndarray) -> tuple[float, float]:
+    return float(place[0]), float(place[1])
 
 
 def _begin(rows: Table) -> np.ndarray:

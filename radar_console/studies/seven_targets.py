@@ -2,7 +2,7 @@
 
 The paper, section 3.2.2, figures 7 to 14: seven targets on complex, crossing trajectories, which are shown
 as pictures only, tracked with JPDA and a particle filter. Published: one picture of the tracks (figure 14),
-and the claim that tracks stay on the trajectories when targets move close to one another and cross. No figures.
+and the claim that tracks stay on the trajectories when targets fly close together and cross. No figures.
 
 The scenario `seven-targets` is of that kind: straight, accelerating and turning legs of up to 2 g, and six
 meetings, among them a pair that flies 2.5 km apart for five minutes and then crosses twice; raw returns, 4 s
@@ -19,7 +19,7 @@ Running time: 100 runs take some six minutes on one core.
 """
 
 from collections.abc import Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -106,7 +106,7 @@ def meetings(at: Array) -> list[Meeting]:
     return sorted(met, key=lambda meeting: meeting.closest)
 
 
-def kept(holder: NDArray[np.int64], meeting: Meeting) -> NDArray[np.bool_]:
+def kept(holder: NDArray[Any], meeting: Meeting) -> NDArray[np.bool_]:
     """(runs,) whether both targets kept their tracks; `holder` (instants, targets, runs)."""
     pair = [meeting.first, meeting.second]
     before, after = holder[meeting.before, pair], holder[meeting.after, pair]

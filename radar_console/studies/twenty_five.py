@@ -9,7 +9,7 @@ That can be read as 5 in a radius of 15 km, or as 5 in 15 km², which is 47 time
 `twenty-five` and `twenty-five-dense`. Raw returns, 4 s a turn, beam 1.5°. At 200 km the beam is 5 km wide,
 so in the dense reading most false echoes merge with the target's. Both are scored once a second:
 
-- a target is held while a track is within 2 km of it; it is lost when it was held, and is not in its last 40 s;
+- a target is held while a track is within 2 km of it; it is lost if it was held, and is not in its last 40 s;
 - a false track is near no target for most of its life;
 - GOSPA has c = 5 km, p = 2: a missed target and a false track cost 3.5 km each, in quadrature.
 
