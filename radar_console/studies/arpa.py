@@ -134,7 +134,7 @@ def run(work: Work) -> list[Finding]:
         scores[name].append(score(scene, result, work.seed))
         if name == "kalman":
             bounds.append(_bound(scene, result))
-    arpa_figures.ratios(work, scores)
+    arpa_figures.ratios(work, scores, bounds)
     arpa_figures.over_time(work, scores["kalman"])
     return [*_sums(scores), *_table(scores["kalman"], bounds)]
 
@@ -256,7 +256,8 @@ def _table(scores: Sequence[Score], bounds: Sequence[Mapping[str, Array]]) -> li
             verdict = f"{judged(figure, limit)}; {exact:.2g} with own motion exact"
             if what in bound:
                 least = bound[what][int(np.flatnonzero(60.0 * minutes == TIMES)[0])]
-                verdict += f", bound {least:.2g}"
+                beyond = ", which is beyond the limit" if least > limit else ""
+                verdict += f", Cramér-Rao bound {least:.2g}{beyond}"
             quantity = f"{score.scene.name}, {minutes} min: {what}"
             rows.append(found(quantity, QUANTITIES[what], figure, verdict, limit))
     return rows

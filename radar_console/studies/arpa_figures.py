@@ -5,6 +5,7 @@ from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
+from matplotlib.ticker import LogLocator, NullLocator
 
 from radar_console.studies.arpa_runs import TIMES
 from radar_console.studies.drawing import BLUE, GREEN, INK, ORANGE, PURPLE, RED, figure
@@ -17,8 +18,15 @@ _SCENES = (BLUE, ORANGE, GREEN, PURPLE)
 _FILTERS = {"kalman": ("Kalman filter", BLUE, 0.16), "particle": ("particle filter", RED, -0.16)}
 
 
-def ratios(work: Work, scores: Mapping[str, Sequence["Score"]]) -> None:
-    """Errors over their limits, after one minute and after three, with 95 % intervals."""
+def ratios(
+    work: Work, scores: Mapping[str, Sequence["Score"]], bounds: Sequence[Mapping[str, np.ndarray]]
+) -> None:
+    """Errors over their limits, after one minute and after three, with 95 % intervals.
+
+    Parameters
+    ----------
+    bounds : by scene and quantity, (times,) the Cramér-Rao bound of 95 % errors, in the quantity's unit
+    """
     first = next(iter(scores.values()))
     with figure(work, "arpa", 2, size=(9.0, 6.0), sharex=True) as (drawn, axes):
         for ax, minutes in zip(axes, (1, 3), strict=True):
@@ -47,6 +55,21 @@ def ratios(work: Work, scores: Mapping[str, Sequence["Score"]]) -> None:
                     lw=1.1,
                     label=label,
                 )
+            at = int(np.flatnonzero(60.0 * minutes == TIMES)[0])
+            bounded = [
+                (row, bounds[number][what][at] / limit)
+                for row, (number, what, limit) in zip(rows, lines, strict=True)
+                if what in bounds[number]
+            ]
+            ax.plot(
+                [ratio for _, ratio in bounded],
+                [row for row, _ in bounded],
+                "|",
+                color=INK,
+                ms=13,
+                mew=1.4,
+                label="Cramér-Rao bound (without gyro and log)",
+            )
             ax.axvline(1.0, color=INK, lw=1.2, ls=(0, (5, 3)), zorder=1)
             ax.set_yticks(rows, [f"scene {number + 1} · {what}" for number, what, _ in lines])
             ax.tick_params(axis="y", length=0)
@@ -64,7 +87,7 @@ def ratios(work: Work, scores: Mapping[str, Sequence["Score"]]) -> None:
             handles,
             labels,
             loc="outside lower center",
-            ncols=2,
+            ncols=3,
             title=f"{runs} runs; left of the dashed line passes",
         )
 
@@ -79,10 +102,13 @@ def over_time(work: Work, scores: Sequence["Score"]) -> None:
                 ax.plot(TIMES / 60.0, score.within[what].value, color=colour, label=f"scene {number + 1}")
                 for minutes, of, limit in score.scene.limits:
                     if of == what:
-                        ax.plot(minutes, limit, "v", color=colour, ms=7, mec="white", mew=0.7, clip_on=False)
+                        beside = minutes + 0.055 * (number - 1.5)  # equal limits must not hide one another
+                        ax.plot(beside, limit, "v", color=colour, ms=7, mec="white", mew=0.7)
             ax.set(yscale="log", title=what[0].upper() + what[1:], ylabel=f"error, {unit}")
+            ax.yaxis.set_major_locator(LogLocator(subs=(1.0, 3.0)))
+            ax.yaxis.set_minor_locator(NullLocator())
             ax.yaxis.set_major_formatter("{x:g}")
-            ax.set_xlim(0.4, 3.1)
+            ax.set_xlim(0.4, 3.15)
         for ax in axes[3:]:
             ax.set_xlabel("steady tracking, min")
         handles, labels = axes[0].get_legend_handles_labels()
