@@ -1,9 +1,10 @@
 """The IMO's four ARPA test scenes: pass or fail, after one minute and after three.
 
-IMO resolution A.823(19), Performance standards for automatic radar plotting aids, 1995, section 3.8 and
-appendices 2 and 3: own ship steers 000°, a target of given range, bearing and relative motion is tracked.
-Within 1 minute of steady tracking its relative course and speed and the CPA must be known so well, within 3
-minutes these, TCPA, true course and true speed, with a probability of 95 %. Published: these limits.
+No paper but a standard: IMO resolution A.823(19), Performance standards for automatic radar plotting aids,
+1995, section 3.8 and appendices 2 and 3: own ship steers 000°, a target of given range, bearing and
+relative motion is tracked. Within 1 minute of steady tracking its relative course and speed and the CPA
+must be known so well, within 3 minutes these, TCPA, true course and true speed, with a probability of 95 %.
+Published: these limits.
 
 Scenarios `arpa-1` to `arpa-4`: a radar of 24 turns a minute that moves with own ship, one measurement a
 turn with P_D = 0.9. Its errors are appendix 3's, added up as variances and drawn anew at each turn (the
@@ -53,6 +54,8 @@ QUANTITIES = {
     "true course": "°",
     "true speed": "kn",
 }
+LOST = 999.0
+"""The error, in any unit, of a target that has no track."""
 _SIZE = 10  # runs of a part
 _OWN, _BOUNDS = 0, 1
 _PART = 0.95  # of the runs must be within the limits
@@ -100,21 +103,26 @@ class Score(NamedTuple):
 
     Attributes
     ----------
-    within, exact : by quantity (times,), the error that 95 % of the runs stay within, in its unit: with
-        what gyro and log do, and with own ship's motion exact
+    errors, exact : by quantity (times, runs), in its unit: with what gyro and log do, and with own ship's
+        motion exact
     tracked : (runs,) 1 where the target is tracked at all `TIMES`
     """
 
     scene: Scene
-    within: dict[str, Interval]
-    exact: dict[str, Interval]
+    errors: dict[str, Array]
+    exact: dict[str, Array]
     tracked: Array
+
+    def within(self, what: str) -> Array:
+        """(times,) what 95 % of the runs stay within."""
+        return most(self.errors[what])
 
     def at(self, minutes: int, what: str) -> tuple[Interval, float]:
         """The figure after so many minutes, and the one with own ship's motion exact."""
         k = int(np.flatnonzero(60.0 * minutes == TIMES)[0])
-        one = self.within[what]
-        return Interval(one.value[k], one.low[k], one.high[k], one.runs), float(self.exact[what].value[k])
+        rng = generator(_BOUNDS, minutes)  # the same runs for all figures
+        figure = intervals.bootstrap(most, self.errors[what][k], rng=rng)
+        return figure, float(most(self.exact[what][k]))
 
 
 def run(work: Work) -> list[Finding]:
@@ -153,13 +161,7 @@ def score(scene: Scene, result: Arrays, seed: int) -> Score:
     along = own / np.hypot(*own)
     shown = _turned((own[:, None] + along[:, None] * log)[None], gyro)[0]
     real = errors(_turned_state(estimate, gyro + roll), truth, shown, own)
-    bounds_rng = generator(seed, _BOUNDS, SCENES.index(scene))
-    return Score(
-        scene,
-        {what: intervals.bootstrap(most, values, rng=bounds_rng) for what, values in real.items()},
-        {what: intervals.bootstrap(most, values, rng=bounds_rng) for what, values in exact.items()},
-        np.isfinite(estimate).all(axis=(0, 1)).astype(float),
-    )
+    return Score(scene, real, exact, np.isfinite(estimate).all(axis=(0, 1)).astype(float))
 
 
 def most(values: Array) -> Array:
@@ -170,7 +172,7 @@ def most(values: Array) -> Array:
 
 
 def errors(estimate: Array, truth: Array, own_shown: Array, own: Array) -> dict[str, Array]:
-    """Absolute errors (times, runs) of the six quantities, in their units; infinite where there is no track.
+    """Absolute errors (times, runs) of the six quantities, in their units; `LOST` where there is no track.
 
     Parameters
     ----------
@@ -185,7 +187,7 @@ def errors(estimate: Array, truth: Array, own_shown: Array, own: Array) -> dict[
         error: Array = shown[what] - real[what]
         if unit == "°":
             error = wrap(error * DEG) / DEG
-        result[what] = np.where(np.isfinite(error), np.abs(error), np.inf)
+        result[what] = np.where(np.isfinite(error), np.abs(error), LOST)
     return result
 
 

@@ -98,8 +98,8 @@ def over_time(work: Work, scores: Sequence["Score"]) -> None:
 
     with figure(work, "arpa-time", 3, rows=2, size=(9.6, 5.6), sharex=True) as (drawn, axes):
         for ax, (what, unit) in zip(axes, QUANTITIES.items(), strict=True):
-            for number, (score, colour) in enumerate(zip(scores, _SCENES, strict=True)):
-                ax.plot(TIMES / 60.0, score.within[what].value, color=colour, label=f"scene {number + 1}")
+            for number, (score, colour) in enumerate(zip(scores, _SCENES, strict=False)):
+                ax.plot(TIMES / 60.0, score.within(what), color=colour, label=f"scene {number + 1}")
                 for minutes, of, limit in score.scene.limits:
                     if of == what:
                         beside = minutes + 0.055 * (number - 1.5)  # equal limits must not hide one another

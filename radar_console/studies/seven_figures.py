@@ -6,27 +6,32 @@ from typing import TYPE_CHECKING
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
+from matplotlib.patheffects import withStroke
+from matplotlib.ticker import MultipleLocator
 
 from radar_console.core.messages import Table
 from radar_console.evaluation.intervals import Interval
-from radar_console.studies.drawing import BLUE, GREEN, GREY, INK, ORANGE, PALE, PURPLE, RED, SKY, figure
+from radar_console.studies.drawing import BLUE, GREEN, GREY, INK, ORANGE, PURPLE, RED, SKY, figure
 from radar_console.studies.scenario_runs import Picture
 from radar_console.studies.work import Work
 
 if TYPE_CHECKING:
     from radar_console.studies.seven_targets import Meeting
 
+_HALO = (withStroke(linewidth=2.5, foreground="white"),)
+_CROWDED = 10e3  # m
 COLOURS = (BLUE, RED, GREEN, ORANGE, PURPLE, SKY, INK)
+_TRUTH = "#D0D6DB"
 _FIRST = 7
 """The paper's figure of target 1."""
 
 
 def each(work: Work, picture: Picture, tracks: Sequence[Table], met: Sequence["Meeting"]) -> None:
     """Figures 7 to 13: truth and track of each target."""
-    with figure(work, "seven-targets-each", 4, rows=2, size=(9.6, 5.4)) as (_, axes):
+    with figure(work, "seven-targets-each", 4, rows=2, size=(9.6, 5.2)) as (_, axes):
         for number, (ax, rows) in enumerate(zip(axes, tracks, strict=False)):
             true = picture.truth[picture.truth["target"] == number]
-            ax.plot(true["east"] / 1e3, true["north"] / 1e3, color=PALE, lw=5.0, solid_capstyle="round")
+            ax.plot(true["east"] / 1e3, true["north"] / 1e3, color=_TRUTH, lw=5.0, solid_capstyle="round")
             ax.plot(rows["east"] / 1e3, rows["north"] / 1e3, color=COLOURS[number], lw=1.4)
             ax.plot(true["east"][0] / 1e3, true["north"][0] / 1e3, "o", color=INK, ms=4)
             for meeting in met:
@@ -35,6 +40,7 @@ def each(work: Work, picture: Picture, tracks: Sequence[Table], met: Sequence["M
                     ax.plot(now["east"] / 1e3, now["north"] / 1e3, "o", mfc="none", mec=INK, ms=9, mew=0.9)
             _square(ax, true)
             ax.set_title(f"{_FIRST + number} · target {number + 1}")
+            ax.set_title(f"{_rms(true, rows):.0f} m rms", loc="right", fontsize=8.5, weight="normal")
             ax.set_xlabel("east, km")
             ax.set_ylabel("north, km")
         key = axes[-1]
@@ -44,7 +50,7 @@ def each(work: Work, picture: Picture, tracks: Sequence[Table], met: Sequence["M
 
 def whole(work: Work, picture: Picture, tracks: Sequence[Table], met: Sequence["Meeting"]) -> None:
     """Figure 14: all tracks, with what the radar saw."""
-    with figure(work, "seven-targets-whole", size=(7.2, 6.2)) as (_, (ax,)):
+    with figure(work, "seven-targets-whole", size=(6.8, 6.8)) as (_, (ax,)):
         ax.plot(*(picture.seen.T / 1e3), ".", color=GREY, ms=1.8, alpha=0.45, lw=0, zorder=1)
         for number, rows in enumerate(tracks):
             ax.plot(rows["east"] / 1e3, rows["north"] / 1e3, color=COLOURS[number], lw=1.6)
@@ -60,20 +66,23 @@ def whole(work: Work, picture: Picture, tracks: Sequence[Table], met: Sequence["
             ax.annotate(
                 str(number + 1),
                 (rows["east"][0] / 1e3, rows["north"][0] / 1e3),
-                _point(-11.0 * _begin(rows)),
+                _point(_beside(rows, tracks)),
                 textcoords="offset points",
                 color=COLOURS[number],
                 weight="bold",
                 ha="center",
                 va="center",
+                path_effects=_HALO,
             )
         for meeting in met:
             now = picture.truth[picture.truth["target"] == meeting.first][meeting.closest]
             ax.plot(now["east"] / 1e3, now["north"] / 1e3, "o", mfc="none", mec=INK, ms=11, mew=0.9)
         ax.plot(0.0, 0.0, "+", color=INK, ms=9)
-        ax.annotate("radar", (0.0, 0.0), (6, -10), textcoords="offset points", fontsize=8.5)
+        ax.annotate("radar", (0.0, 0.0), (7, -11), textcoords="offset points", path_effects=_HALO)
         ax.set_aspect("equal")
         ax.set(xlabel="east, km", ylabel="north, km", title="14 · all tracks, centroids (dots) and meetings")
+        far = 1.12 * max(np.abs(picture.truth[name]).max() for name in ("east", "north")) / 1e3
+        ax.set(xlim=(-far, far), ylim=(-far, far))
 
 
 def over_runs(work: Work, through: Mapping["Meeting", Interval], held: Sequence[Interval]) -> None:
@@ -103,11 +112,16 @@ def _point(place: np.ndarray) -> tuple[float, float]:
     return float(place[0]), float(place[1])
 
 
-def _begin(rows: Table) -> np.ndarray:
-    """The direction in which a track begins."""
+def _beside(rows: Table, tracks: Sequence[Table]) -> np.ndarray:
+    """Where the label of a track goes from its start, points: behind it, and aside from others near by."""
     way = np.array([rows["east"][3] - rows["east"][0], rows["north"][3] - rows["north"][0]])
-    direction: np.ndarray = way / np.linalg.norm(way)
-    return direction
+    way = way / np.linalg.norm(way)
+    place = np.array([rows["east"][0], rows["north"][0]])
+    others = np.array([[each["east"][0], each["north"][0]] for each in tracks]) - place
+    near = others[(np.linalg.norm(others, axis=1) < _CROWDED) & others.any(axis=1)]
+    aside = -near.sum(axis=0) / max(float(np.linalg.norm(near.sum(axis=0))), 1.0)
+    offset: np.ndarray = -11.0 * way + 8.0 * aside
+    return offset
 
 
 def _square(ax: Axes, true: Table) -> None:
@@ -117,12 +131,20 @@ def _square(ax: Axes, true: Table) -> None:
     x, y = 0.5 * (east.min() + east.max()), 0.5 * (north.min() + north.max())
     ax.set_xlim(x - half, x + half)
     ax.set_ylim(y - half, y + half)
+    for axis in (ax.xaxis, ax.yaxis):
+        axis.set_major_locator(MultipleLocator(10.0 if half < 30.0 else 50.0))
     ax.set_aspect("equal")
+
+
+def _rms(true: Table, rows: Table) -> float:
+    """How far a track's rows are from the truth, which is given every second, m."""
+    east, north = (np.interp(rows["time"], true["time"], true[name]) for name in ("east", "north"))
+    return float(np.sqrt(np.mean((rows["east"] - east) ** 2 + (rows["north"] - north) ** 2)))
 
 
 def _key() -> list[Line2D]:
     return [
-        Line2D([], [], color=PALE, lw=5.0, label="truth"),
+        Line2D([], [], color=_TRUTH, lw=5.0, label="truth"),
         Line2D([], [], color=GREY, lw=1.4, label="track (in colour)"),
         Line2D([], [], color=INK, marker="o", ms=4, lw=0, label="start"),
         Line2D([], [], marker="o", mfc="none", mec=INK, ms=9, lw=0, label="meets another"),

@@ -133,7 +133,7 @@ def _claim(result: Arrays, met: Sequence[Meeting]) -> list[Finding]:
     all_meetings, all_clean = intervals.proportion(through), intervals.proportion(clean)
     said = "the paper, of one picture: tracks are kept; here"
     return [
-        found("all six meetings of a run kept", "", all_meetings, f"{said} {_of(through)}"),
+        found(f"all {len(met)} meetings of a run kept", "", all_meetings, f"{said} {_of(through)}"),
         found("no swap and no lost target in a run", "", all_clean, f"{said} {_of(clean)}"),
     ]
 
@@ -162,16 +162,17 @@ def _sums(result: Arrays, seed: int) -> list[Finding]:
     rows = [
         found("time to confirm", "s", intervals.mean(result["time_to_confirm_s"]), "a turn takes 4 s"),
         found("RMSE of position", "m", rmse, "of all targets while they have a track"),
+        found("false tracks a run", "", intervals.mean(result["false_tracks"]), "of all that are confirmed"),
     ]
     for name, what in (
-        ("swaps", "swaps a run"),
-        ("fragments", "breaks of a track a run"),
-        ("lost", "lost targets a run"),
-        ("false_tracks", "false tracks a run"),
-        ("duplicate_tracks", "second tracks of a target a run"),
+        ("swaps", "runs with a swap"),
+        ("fragments", "runs with a break of a track"),
+        ("lost", "runs with a lost target"),
+        ("false_tracks", "runs with a false track"),
+        ("duplicate_tracks", "runs with a second track of a target"),
     ):
-        some = _of(result[name] > 0)
-        rows.append(found(what, "", intervals.mean(result[name]), f"there were any in {some}"))
+        total = f"{result[name].sum():,.0f} in {len(result[name]):,} runs"
+        rows.append(found(what, "", intervals.proportion(result[name] > 0), total))
     return rows
 
 

@@ -39,12 +39,15 @@ _FIGURES = (
     ("held", "targets held at some time, of 25", ""),
     ("time_to_confirm_s", "time to confirm", "s"),
     ("continuity", "continuity", ""),
-    ("swaps", "swaps a run", ""),
-    ("lost", "lost targets a run", ""),
     ("false_tracks", "false tracks a run", ""),
-    ("duplicate_tracks", "second tracks of a target a run", ""),
     ("gospa_m", "GOSPA", "m"),
     ("rmse_position_m", "RMSE of position", "m"),
+)
+_EVENTS = (
+    ("swaps", "runs with a swap"),
+    ("lost", "runs with a lost target"),
+    ("false_tracks", "runs with a false track"),
+    ("duplicate_tracks", "runs with a second track of a target"),
 )
 
 
@@ -58,10 +61,15 @@ def run(work: Work) -> list[Finding]:
 def _findings(name: str, result: Arrays) -> list[Finding]:
     figures = {metric: intervals.mean(result[metric]) for metric, _, _ in _FIGURES}
     reading = READINGS[name]
-    return [
+    rows = [
         found(f"{what}, {reading}", unit, figures[metric], _verdict(metric, result))
         for metric, what, unit in _FIGURES
     ]
+    for metric, what in _EVENTS:
+        values = result[metric]
+        total = f"{values.sum():,.0f} in {len(values):,} runs of {_TARGETS} targets"
+        rows.append(found(f"{what}, {reading}", "", intervals.proportion(values > 0), total))
+    return rows
 
 
 def _verdict(metric: str, result: Arrays) -> str:
@@ -72,13 +80,13 @@ def _verdict(metric: str, result: Arrays) -> str:
         return "every target in every run" if not lacking else f"not all of them in {_of(lacking, values)}"
     if metric == "continuity":
         worst = result["target_continuity"].mean(axis=1).min()
-        after = 1.0 - result["time_to_confirm_s"].mean() / 480.0
+        after = 1.0 - result["time_to_confirm_s"].mean() / (_EVERY * (len(result["time_held"]) - 1))
         return f"{after:.3f} if none were let go once confirmed; the worst target has {worst:.3f}"
     if metric == "time_to_confirm_s":
         slow = np.nanquantile(result["target_time_to_confirm"], 0.95)
         return f"{values.mean() / 4.0:.1f} turns; 95 % of the targets within {slow:.0f} s"
-    if metric in ("swaps", "lost", "false_tracks", "duplicate_tracks"):
-        return f"there were any in {_of(int((values > 0).sum()), values)}"
+    if metric == "false_tracks":
+        return f"{values.max():.0f} at most in a run"
     if metric == "gospa_m":
         parts = {part: result[f"gospa_{part}_m"] ** 2 for part in ("location", "missed", "false")}
         whole = sum(each.mean() for each in parts.values())
@@ -107,7 +115,7 @@ def draw(work: Work, results: Mapping[str, Arrays]) -> None:
                 each = intervals.mean(values)
                 ax.fill_between(time, *_bounds(each), color=_COLOURS[reading], alpha=0.22, lw=0)
                 ax.plot(time, each.value, color=_COLOURS[reading], label=READINGS[reading], lw=1.3)
-            ax.set(xlabel="time, min", ylabel=label, title=title, xlim=(0, 8), ylim=(0, None))
+            ax.set(xlabel="time, min", ylabel=label, title=title, xlim=(0, time[-1]), ylim=(0, None))
         axes[0].axhline(_TARGETS, color=GREY, lw=1.0, ls=(0, (5, 3)), zorder=1)
         axes[0].set_ylim(0, 26)
         runs = next(iter(results.values()))["held"].shape[-1]
