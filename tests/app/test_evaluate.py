@@ -73,12 +73,25 @@ def test_more_runs_and_runs_again(command: Command, small: Path, capsys: pytest.
 
 @pytest.mark.usefixtures("no_report")
 def test_killed_and_gone_on_with(command: Command, small: Path) -> None:
-    """A process that is killed outright leaves whole runs; the same command does the others, once."""
+    """Two processes at work are killed with their parent; the same command does the other runs, once."""
     arguments = ["evaluate", small, "--runs", 5, *QUICK]
+    command_line = [
+        sys.executable,
+        "-m",
+        "radar_console",
+        *map(str, arguments),
+        "--jobs",
+        "2",
+        "-o",
+        "killed",
+    ]
     killed = subprocess.Popen(
-        [sys.executable, "-m", "radar_console", *map(str, arguments), "-o", "killed"], cwd=small.parent,
-        stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, env=os.environ | {"PYTHONPATH": str(ROOT)},
-    )  # fmt: skip
+        command_line,
+        cwd=small.parent,
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.DEVNULL,
+        env=os.environ | {"PYTHONPATH": str(ROOT)},
+    )
     file = small.parent / "killed" / "results.csv"
     until = time.monotonic() + 60.0
     while not file.exists() or file.read_bytes().count(b"\n") < 4:
