@@ -412,6 +412,15 @@ def load(file: Path) -> Scenario:
     return parse(read_toml(file), file)
 
 
+def shipped() -> dict[str, Path]:
+    """The scenario files that come along, by name."""
+    here = Path(__file__).resolve().parent
+    # In a wheel they lie in the package, in a checkout beside it.
+    folders = (here / "scenarios", here.parent / "scenarios")
+    folder = next((f for f in folders if any(f.glob("*.toml"))), folders[0])
+    return {file.stem: file for file in sorted(folder.glob("*.toml"))}
+
+
 def load_configuration(file: Path) -> tuple[Configuration, frozenset[str]]:
     """Read the settings for a recording from a scenario file, or from one with just those tables.
 

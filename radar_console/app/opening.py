@@ -18,11 +18,7 @@ AIR_TRAFFIC = {"range_unit": "NM", "speed_unit": "kn", "trail_s": 300.0}
 
 def scenarios() -> dict[str, Path]:
     """The scenario files that come along, by name."""
-    here = Path(__file__).resolve()
-    # In a wheel they lie in the package, in a checkout beside it.
-    folders = (here.parents[1] / "scenarios", here.parents[2] / "scenarios")
-    folder = next((f for f in folders if (f / f"{DEMO}.toml").is_file()), folders[0])
-    return {file.stem: file for file in sorted(folder.glob("*.toml"))}
+    return scenario.shipped()
 
 
 def open_source(

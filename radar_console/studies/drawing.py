@@ -45,18 +45,20 @@ STYLE: Any = {
 
 
 @contextmanager
-def figure(work: Work, name: str, columns: int = 1, **more: Any) -> Iterator[tuple[Figure, list[Axes]]]:
-    """A figure with axes side by side, written to `name`.png at the end.
+def figure(
+    work: Work, name: str, columns: int = 1, rows: int = 1, **more: Any
+) -> Iterator[tuple[Figure, list[Axes]]]:
+    """A figure with axes side by side, row after row, written to `name`.png at the end.
 
     Parameters
     ----------
-    columns : how many axes
+    columns, rows : how many axes
     more : for `Figure.subplots`; `size` (width, height) in inches
     """
     size = more.pop("size", (8.6, 4.2))
     with mpl.rc_context(STYLE):
         drawn = Figure(figsize=size)
-        axes = drawn.subplots(1, columns, squeeze=False, **more)[0].tolist()
+        axes = drawn.subplots(rows, columns, squeeze=False, **more).ravel().tolist()
         yield drawn, axes
         drawn.savefig(work.folder / f"{name}.png", metadata={"Software": None})
     work.figures.append(f"{name}.png")

@@ -19,7 +19,7 @@ Filters, all started from two scans and scored from the second scan after those,
 - IMM of constant velocity (0.1 m/s²) and constant acceleration (10 m/s² a scan), switching with 0.02 a scan;
   IMM3 has a coordinated turn beside these.
 - RBPF, the Rao-Blackwellised particle filter of `estimation/rao_blackwell.py`, 500 particles, one setting for
-  all cases, chosen on other random trajectories than those scored.
+  all cases, chosen on other random trajectories than those scored, and on the others with other noise.
 - Bootstrap particle filter with regimes, 500 and 5,000 particles, on a fifth of the runs: fragile.
 - Particle filters with a single model, σ_a = 10 m/s², on truth from that model: they go to the KF as they
   grow.
