@@ -22,6 +22,9 @@ from radar_console.tracker.records import (
     N_OPEN,
     N_PAIRS,
     N_POOL,
+    NIL,
+    NO,
+    YES,
     World,
 )
 
@@ -146,7 +149,7 @@ def evidence(track: Any, plot: Any, par: Any) -> float:
 @njit(cache=True, nogil=True, error_model="numpy")
 def associate(w: World) -> None:
     """Find the probability of every pair, cluster by cluster, and use the plots up."""
-    lo, stop = 0, w.books.size[N_MEMBERS]
+    lo, stop = NIL, w.books.size[N_MEMBERS]
     while lo < stop:
         hi = lo + 1
         while hi < stop and w.members[hi].cluster == w.members[lo].cluster:
@@ -166,7 +169,7 @@ def _associate(lo: int, hi: int, w: World) -> None:
     kept = np.empty(pairs, np.int64)
     for k in range(begin, end):
         pool[w.pairs[k].plot].mark = -1
-    n, plots = 0, 0
+    n, plots = 0, NIL
     for i in range(m):
         member = w.members[lo + i]
         track = tracks[member.track]
@@ -256,7 +259,7 @@ def serve_members(beam: Any, w: World) -> None:
                 best = k
         if best >= 0:
             pair = w.pairs[best]
-            _serve(track, member.track, member.used >= 0.5, True, w.pool[pair.plot], pair.beta, member.rough,
+            _serve(track, member.track, member.used >= 0.5, YES, w.pool[pair.plot], pair.beta, member.rough,
                    beam, w.par, w.books)  # fmt: skip
         else:
-            _serve(track, member.track, False, False, w.pool[0], math.nan, member.rough, beam, w.par, w.books)
+            _serve(track, member.track, NO, NO, w.pool[0], math.nan, member.rough, beam, w.par, w.books)

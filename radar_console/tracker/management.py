@@ -23,13 +23,16 @@ from radar_console.tracker.records import (
     N_ROWS,
     N_SLOTS,
     N_TRACKS,
+    NO,
     PARTICLE,
     SCORE,
     STARTER,
     TENTATIVE,
+    YES,
     Belief,
     Books,
     World,
+    variable,
 )
 
 _wrap, _too_fast, _start_belief, _predicted = gating.wrap, gating.too_fast, filters.start, gating.predicted
@@ -43,8 +46,10 @@ _DENSER = math.log(10.0)  # what dense clutter adds to the score that confirms
 _DOUBT = 0.1  # and more for each pass: what an error of the density by a tenth adds to a false score
 _LEAST_HITS = 3
 _WIDER = 3.0  # velocities at confirmation: so young an estimate errs more than its covariance says
-_TENTATIVE, _CONFIRMED = int(TrackStatus.TENTATIVE), int(TrackStatus.CONFIRMED)
-_COASTING, _DELETED = int(TrackStatus.COASTING), int(TrackStatus.DELETED)
+_TENTATIVE = variable(TrackStatus.TENTATIVE)
+_CONFIRMED = variable(TrackStatus.CONFIRMED)
+_COASTING = variable(TrackStatus.COASTING)
+_DELETED = variable(TrackStatus.DELETED)
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -80,7 +85,7 @@ def begin(plot: Any, dense: bool, w: World) -> None:
     _begin_height(track, plot)
     track.dense, track.voiced = dense, True
     track.swept = track.served = track.dead = track.claims = track.proven = False
-    report(track, _TENTATIVE, True, True, plot, 1.0, False, plot.t, par, w.books)
+    report(track, _TENTATIVE, YES, YES, plot, 1.0, NO, plot.t, par, w.books)
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -182,7 +187,7 @@ def confirm(index: int, plot: Any, beam: Any, w: World) -> None:
     track.level, track.slot = CONFIRMED, size[N_SLOTS]
     w.belief.owner[track.slot] = index
     size[N_SLOTS] += 1
-    report(track, _CONFIRMED, True, True, plot, track.probability, False, track.t, w.par, w.books)
+    report(track, _CONFIRMED, YES, YES, plot, track.probability, NO, track.t, w.par, w.books)
     if w.par.filter == PARTICLE:
         _widen(track.P)
     _start_belief(track, beam.e, beam.n, w.par, w.belief)

@@ -1,9 +1,18 @@
 """The tables that the compiled sweep works on."""
 
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, cast
 
 import numpy as np
 from numpy.typing import NDArray
+
+
+def variable(value: int) -> int:
+    """A number for calls between kernels: numba compiles them anew for each literal they are given."""
+    return cast(int, np.int64(value))
+
+
+NIL = variable(0)
+NO, YES = cast(bool, np.bool_(False)), cast(bool, np.bool_(True))
 
 CONFIRMED, TENTATIVE, STARTER = 0, 1, 2
 """Levels of a track: the lower is served first. A starter has one plot, and no velocity yet."""

@@ -25,6 +25,7 @@ from radar_console.tracker.records import (
     N_ROWS,
     N_SLOTS,
     N_TRACKS,
+    NIL,
     World,
 )
 
@@ -54,9 +55,9 @@ def sweep(beams: Any, queue: Any, w: World, final: bool) -> int:
             return b
         members = w.books.size[N_MEMBERS]
         if members:
-            _weigh(w, 0, members)
+            _weigh(w, NIL, members)
             _associate(w)
-            _step(w, 0, members)
+            _step(w, NIL, members)
         close_bin(beams[b], w, final)
     return int(beams.size)
 

@@ -36,9 +36,12 @@ from radar_console.tracker.records import (
     N_POOL,
     N_SLOTS,
     N_TRACKS,
+    NO,
     STARTER,
     TENTATIVE,
+    YES,
     World,
+    variable,
 )
 
 _BROAD = particle.BROAD
@@ -47,7 +50,8 @@ _density_at, _doubted = clutter.density_at, clutter.doubted
 _evidence, _update_height = clusters.evidence, height.update
 _serve, _begin, _kill, _report = management.serve, management.begin, management.kill, management.report
 _confirm, _DROP, _ascending = management.confirm, management.DROP, order.ascending
-_TENTATIVE, _DELETED = int(TrackStatus.TENTATIVE), int(TrackStatus.DELETED)
+_TENTATIVE = variable(TrackStatus.TENTATIVE)
+_DELETED = variable(TrackStatus.DELETED)
 _PRUNE = 1e-3  # of the miss: a pair that is less likely is no pair
 _NOBODY, _HELD = -2, -3  # marks of a plot: no track waits for it; some do
 _DENSE = 0.3  # false plots in the gate of a track's second plot, from which on clutter counts as dense
@@ -98,7 +102,7 @@ def _settle_alone(index: int, beam: Any, w: World) -> None:
     miss = 1.0 - par.p_d * par.p_g
     if count == 0:
         track.score += math.log(max(miss, 1e-300))
-        _serve(track, index, False, False, pool[0], math.nan, False, beam, par, w.books)
+        _serve(track, index, NO, NO, pool[0], math.nan, NO, beam, par, w.books)
         return
     beta, chosen = np.empty(count), np.empty(count, np.int64)
     n, total, best, k = 0, miss, -1, track.first
@@ -117,14 +121,14 @@ def _settle_alone(index: int, beam: Any, w: World) -> None:
         k = edges[k].next
     track.score += math.log(max(total, 1e-300))
     if best < 0:
-        _serve(track, index, False, False, pool[0], math.nan, False, beam, par, w.books)
+        _serve(track, index, NO, NO, pool[0], math.nan, NO, beam, par, w.books)
         return
     used = 0.0
     for j in range(n):
         beta[j] /= total
         used += beta[j]
     _update_tentative(track, beta[:n], chosen[:n], pool, par)
-    _serve(track, index, used >= 0.5, True, pool[chosen[best]], beta[best], False, beam, par, w.books)
+    _serve(track, index, used >= 0.5, YES, pool[chosen[best]], beta[best], NO, beam, par, w.books)
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -185,7 +189,7 @@ def _settle_branching(index: int, beam: Any, w: World) -> None:
         k = track.first
         while k >= 0:
             if k != best and edges[k].density > least:
-                _branch(index, k, False, beam, w)
+                _branch(index, k, NO, beam, w)
             k = edges[k].next
         track.voiced = False
     track.score += math.log(max(miss, 1e-300))
@@ -195,7 +199,7 @@ def _settle_branching(index: int, beam: Any, w: World) -> None:
     if lost and not track.voiced:
         _kill(track, index, w.books)
         return
-    _serve(track, index, False, False, pool[0], math.nan, False, beam, par, w.books)
+    _serve(track, index, NO, NO, pool[0], math.nan, NO, beam, par, w.books)
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -219,7 +223,7 @@ def _branch(index: int, k: int, voiced: bool, beam: Any, w: World) -> None:
         _take(track, chosen, w.pool, w.par)
     else:
         _update_tentative(track, np.ones(1), np.full(1, chosen), w.pool, w.par)
-    _serve(track, child, True, True, w.pool[chosen], 1.0, False, beam, w.par, w.books)
+    _serve(track, child, YES, YES, w.pool[chosen], 1.0, NO, beam, w.par, w.books)
     track.served = track.swept = False
     if track.hits > 2:
         edge.track, edge.spent = child, True
@@ -299,14 +303,12 @@ def _merge(plot: Any, beam: Any, w: World) -> bool:
             if track.proven and _branches(track, w.par) and _is_known(track, w):
                 track.proven = False
                 if track.voiced:
-                    _report(
-                        track, _TENTATIVE, True, True, plot, track.probability, False, track.t, w.par, w.books
-                    )
+                    _report(track, _TENTATIVE, YES, YES, plot, track.probability, NO, track.t, w.par, w.books)
             if (track.level == CONFIRMED or track.proven) and (winner < 0 or _before(index, winner, w)):
                 winner = index
         k = edges[k].next
     if winner >= 0:
-        _absorb(winner, ends[:n], False, w)
+        _absorb(winner, ends[:n], NO, w)
         if tracks[winner].level == CONFIRMED:
             return False
         _confirm(winner, plot, beam, w)
@@ -321,7 +323,7 @@ def _merge(plot: Any, beam: Any, w: World) -> bool:
             same = not tracks[ends[j]].dead and tracks[ends[j]].previous == tracks[stays].previous
             if same and _before(ends[j], stays, w):
                 stays = ends[j]
-        _absorb(stays, ends[:n], True, w)
+        _absorb(stays, ends[:n], YES, w)
     _pool(ends[:n], w)
     return False
 
@@ -351,7 +353,7 @@ def _drop(index: int, w: World) -> None:
     """Give up a young track for another one's sake."""
     track = w.tracks[index]
     if track.voiced:
-        _report(track, _DELETED, False, False, w.pool[0], math.nan, False, track.t, w.par, w.books)
+        _report(track, _DELETED, NO, NO, w.pool[0], math.nan, NO, track.t, w.par, w.books)
         w.books.tally[C_MERGED] += 1
     _kill(track, index, w.books)
 
@@ -490,6 +492,6 @@ def purge(w: World) -> None:
     for k in np.argsort(score[:n], kind="mergesort")[:excess]:
         track = tracks[index[k]]
         if track.voiced:
-            _report(track, _DELETED, False, False, w.pool[0], math.nan, False, track.t, w.par, w.books)
+            _report(track, _DELETED, NO, NO, w.pool[0], math.nan, NO, track.t, w.par, w.books)
         _kill(track, index[k], w.books)
         w.books.tally[C_CAPPED] += 1
