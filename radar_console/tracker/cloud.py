@@ -354,7 +354,7 @@ def _propose_cloud(
 @njit(cache=True, nogil=True, error_model="numpy")
 def _open_position(S: Array, Z: Singles, R: Array) -> float:
     """What is left open of the position's variance: less than any of the plots Z and R would leave of it."""
-    left = S[0, 0]
+    left: float = S[0, 0]
     for j in range(R.shape[0]):
         lag, half = float(Z[j, _Z_LAG]), 0.5 * (R[j, 0] - R[j, 2])
         least = max(0.5 * (R[j, 0] + R[j, 2]) - math.hypot(half, R[j, 1]), 0.0)
