@@ -17,7 +17,7 @@ from radar_console.core.errors import RadarConsoleError
 from radar_console.studies.findings import Finding
 from radar_console.studies.work import Work
 
-NAMES = ("filter-rmse", "resampling", "crossing", "ospa-clutter")
+NAMES = ("filter-rmse", "resampling", "crossing", "ospa-clutter", "complexity")
 
 
 class Study(NamedTuple):
