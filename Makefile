@@ -54,9 +54,11 @@ bench: $(COMPILED) ## Measure everything; ours beside others where those are ins
 	echo "== benchmarks/acceptance.py scenario twenty-five"; \
 	$(PYTHON) -m benchmarks.acceptance scenario twenty-five
 
-pictures: $(COMPILED) ## Make the pictures that README and docs show
+pictures: $(COMPILED) ## Make the pictures that README and docs show; the studies' take minutes
 	@mkdir -p docs/pictures
 	@$(PYTHON) -m radar_console twenty-five --screenshot docs/pictures/twenty-five.png --after 120
+	@set -e; for name in filter-rmse resampling; do \
+	    $(PYTHON) -m radar_console study $$name; cp out/$$name/*.png docs/pictures/; done
 
 # One version of each package for all systems and Pythons, with the hashes of its files. Pins stay
 # as they are unless they must move: UPGRADE=--upgrade moves all, UPGRADE="-P numpy" one.

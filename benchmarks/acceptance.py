@@ -18,7 +18,8 @@ import typer
 from radar_console.app.headless import figures_of
 from radar_console.app.opening import open_source
 from radar_console.chain import Chain, Opened
-from radar_console.core.messages import TRACK, Table, TrackStatus
+from radar_console.core.messages import Table, TrackStatus
+from radar_console.evaluation.scenario_run import follow, truth_of
 
 app = typer.Typer(
     add_completion=False, rich_markup_mode="rich", help="Figures of whole runs, scored against the truth."
@@ -27,12 +28,6 @@ app = typer.Typer(
 Identity = Literal["use", "ignore"]
 NEAR = 2000.0  # m; a confirmed track within it of a target is that target's
 HELD = (TrackStatus.CONFIRMED, TrackStatus.COASTING)
-
-
-def run(chain: Chain) -> Table:
-    """All rows of all tracks of a run."""
-    rows = [sector.tracks for sector in chain.run() if len(sector.tracks)]
-    return np.concatenate(rows) if rows else np.empty(0, TRACK)
 
 
 @app.command(epilog="Example:  python benchmarks/acceptance.py scenario twenty-five --first 25 --seeds 10")
@@ -47,7 +42,7 @@ def scenario(
     for seed in range(start, start + seeds):
         opened = open_source(name, seed=seed)
         chain = Chain(opened)
-        tracks = run(chain)
+        tracks = follow(chain)
         held = tracks[np.isin(tracks["status"], HELD)]
         score = score_targets(held, opened, near_m)
         print(f"seed {seed}: {score}  {figures_of(chain, 0.0)['tracker_s_per_scan']} s a scan")
@@ -56,9 +51,7 @@ def scenario(
 def score_targets(held: Table, opened: Opened, near: float) -> str:
     """Assign rows of confirmed tracks to targets; say who was held, when, and how well."""
     rotation = opened.source.radar.rotation
-    assert opened.truth is not None
-    truths = [opened.truth(t) for t in np.arange(0.0, opened.source.duration + 1.0)]
-    targets = np.concatenate(truths)
+    targets = truth_of(opened, 1.0)
     numbers = np.unique(targets["target"])
     born = {n: targets["time"][targets["target"] == n].min() for n in numbers}
     dies = {n: targets["time"][targets["target"] == n].max() for n in numbers}
@@ -150,7 +143,7 @@ def positions(
 ) -> None:
     """Tracks of a plot table against positions in a truth file (time_s, target, east_m, north_m)."""
     opened = open_source(str(table), config)
-    tracks = run(Chain(opened))
+    tracks = follow(Chain(opened))
     held = tracks[np.isin(tracks["status"], HELD)]
     with truth.open(newline="") as file:
         rows = list(csv.DictReader(file))

@@ -238,6 +238,91 @@ def simulate(
     )
 
 
+@app.command(
+    epilog="Examples:  radar-console evaluate twenty-five --runs 100  ·  "
+    "radar-console evaluate twenty-five --set tracker.filter=kalman,particle --set clutter.disc.mean=1,5  ·  "
+    "radar-console evaluate harbour --dask tcp://10.0.0.7:8786  ·  "
+    "radar-console evaluate --tracks tracks.csv --truth truth.csv"
+)
+def evaluate(
+    scenario: Annotated[
+        str | None, typer.Argument(metavar="[SCENARIO]", help="Scenario file, or the name of one.")
+    ] = None,
+    runs: Annotated[int, typer.Option(min=1, help="Runs, with one seed after the other.")] = 200,
+    options: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--set",
+            metavar="KEY=VALUE,VALUE",
+            help="A key of the scenario, and what it is to be; several make a grid. Every setting runs with "
+            "the same seeds.",
+        ),
+    ] = None,
+    output: Annotated[
+        Path | None,
+        typer.Option(
+            "--output",
+            "-o",
+            metavar="DIR",
+            help="Where results.csv and report.html go (default: SCENARIO-evaluation); what is there is gone "
+            "on with. With --tracks: file for the figures.",
+        ),
+    ] = None,
+    dask: Annotated[
+        str | None, typer.Option(metavar="ADDRESS", help="Scheduler of a Dask cluster that does the runs.")
+    ] = None,
+    jobs: Annotated[
+        int | None, typer.Option(min=1, help="Processes here (default: one for each processor).")
+    ] = None,
+    seed: Annotated[
+        int | None, typer.Option(min=0, help="Of the first run (default: the scenario's).")
+    ] = None,
+    rerun: Annotated[
+        list[str] | None, typer.Option(metavar="SEED", help="Run these seeds again, and no others.")
+    ] = None,
+    tracks: Annotated[
+        Path | None, typer.Option(metavar="tracks.csv", help="Score these tracks in place of a scenario's.")
+    ] = None,
+    truth: Annotated[
+        Path | None, typer.Option(metavar="truth.csv", help="Where the targets were, for --tracks.")
+    ] = None,
+    cut_off_m: Annotated[float, typer.Option(min=1e-3, help="Cut-off distance of GOSPA and OSPA.")] = 5000.0,
+    gate_m: Annotated[
+        float, typer.Option(min=1e-3, help="How far a track may be from the target that it holds.")
+    ] = 2000.0,
+    tail_s: Annotated[
+        float, typer.Option(min=0, help="A target that no track holds in its last seconds is lost.")
+    ] = 40.0,
+) -> None:
+    """Run a scenario many times, under one setting or several, and say how good the tracks are."""
+    from radar_console.app import evaluating
+    from radar_console.evaluation.scoring import Scoring
+
+    scoring = Scoring(cut_off_m, gate_m, tail_s)
+    if (tracks is None) != (truth is None) or (scenario is None) == (tracks is None):
+        raise RadarConsoleError("evaluate: expected a SCENARIO, or --tracks and --truth")
+    if tracks is not None and truth is not None:
+        if options or dask or rerun:
+            raise RadarConsoleError(
+                "evaluate: --set, --dask and --rerun go with a SCENARIO, not with --tracks"
+            )
+        figures = evaluating.score_files(tracks, truth, scoring)
+        if output is not None:
+            evaluating.write_scores(figures, output)
+        evaluating.print_scores(figures)
+        return
+    again = evaluating.seeds_of(rerun or [])
+    evaluation = evaluating.Evaluation(scenario or "", options or [], output, scoring)
+    left = f"the runs done are in {evaluation.folder}, and the same command goes on from there"
+    with _interruptible(left):
+        progress = evaluation.carry_out(runs, seed, again, evaluating.workers_of(dask, jobs))
+    typer.echo(f"{progress.done:,} runs → {evaluation.folder / 'report.html'}", err=True)
+    failed = evaluation.failed
+    if failed:
+        typer.echo(f"radar-console: {failed}", err=True)
+        raise typer.Exit(1)
+
+
 @app.command(epilog="Examples:  radar-console info flight.pcap  ·  radar-console info harbour")
 def info(source: SourceArgument, config: ConfigOption = None, radar: RadarOption = None) -> None:
     """Say what a source holds."""

@@ -75,7 +75,7 @@ class Regimes:
 
 
 REGIMES = Regimes()
-"""Chosen on trajectories drawn by lot, other ones than those of the filter study."""
+"""Chosen on the filter study's kinds of trajectories, with other random numbers than it is scored with."""
 
 _MEAN, _LEAST, _TURNS, _AGAIN, _TURN, _SPEED, _KERNEL_TURN, _KERNEL_SPEED, _NOISE, _DRIFT, _KERNEL_TIME = (
     0, 3, 6, 7, 8, 9, 10, 11, 12, 15, 17,

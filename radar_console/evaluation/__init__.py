@@ -1,1 +1,1 @@
-"""How good tracks and filters are: distances between sets, the story of each target, honest covariances."""
+"""How good tracks and filters are, and how sure that is: metrics, intervals, many runs and their report."""

@@ -20,7 +20,7 @@ import numpy as np
 
 from radar_console.core.errors import InputError
 from radar_console.estimation.gaussian import Array
-from radar_console.evaluation.grid import Setting, label, text_of
+from radar_console.evaluation.grid import Setting, text_of
 
 FORMAT = 1
 ERROR_LENGTH = 500  # characters of an error that are kept
@@ -292,7 +292,7 @@ def _write(out: int, line: bytes) -> None:
 def _csv_line(fields: Iterable[str]) -> bytes:
     out = io.StringIO(newline="")
     csv.writer(out, lineterminator="\n").writerow(fields)
-    return out.getvalue().encode("utf-8")
+    return out.getvalue().encode("utf-8", "backslashreplace")
 
 
 def _one_line(text: str) -> str:
@@ -315,13 +315,11 @@ def _difference(there: Any, here: Any, path: str = "") -> str:
     if isinstance(there, list) and isinstance(here, list) and len(there) == len(here):
         pairs = enumerate(zip(there, here, strict=True))
         return next((said for i, (a, b) in pairs if (said := _difference(a, b, f"{path}[{i}]"))), "")
-    if isinstance(there, list) and isinstance(here, list):
-        return f"{path} were {_shown(there)}, now {_shown(here)}"
     return "" if there == here else f"{path} was {_shown(there)}, is {_shown(here)}"
 
 
 def _shown(value: Any) -> str:
     if isinstance(value, list) and all(isinstance(item, dict) for item in value):
-        return "; ".join(map(label, value)) if len(value) < 9 else f"{len(value)} entries"
+        return f"{len(value)} with {', '.join(dict.fromkeys(key for item in value for key in item))}"
     text = text_of(value)
     return text if len(text) <= 60 else text[:57] + "…"

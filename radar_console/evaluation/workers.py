@@ -6,6 +6,7 @@ setting and seed alone, so the numbers are the same whoever does the work. A run
 end the others. A worker that dies is replaced and its run done again, up to `TRIES` times.
 """
 
+import logging
 import os
 import signal
 import threading
@@ -134,8 +135,10 @@ def dask(address: str) -> Workers:
             import distributed
         except ImportError:
             raise RadarConsoleError(
-                "--dask: needs the package distributed; pip install 'radar-console[cluster]'"
+                "--dask: needs the package distributed; in the project's folder: pip install '.[cluster]'"
             ) from None
+        for name in ("distributed", "distributed.client", "distributed.utils", "distributed.core"):
+            logging.getLogger(name).setLevel(logging.CRITICAL)  # what the user must know is said below
         try:
             client = distributed.Client(address, timeout=ANSWER_S, set_as_default=False)
         except (OSError, ValueError) as error:

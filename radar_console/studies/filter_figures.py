@@ -15,7 +15,12 @@ from radar_console.studies.work import Work
 if TYPE_CHECKING:
     from radar_console.studies.filter_rmse import Score
 
-_FILTERS = {"kf": ("best Kalman filter", GREY), "imm": ("IMM", ORANGE), "rbpf": ("RBPF", BLUE)}
+_FILTERS = {
+    "kf": ("best Kalman filter", GREY),
+    "imm": ("IMM", ORANGE),
+    "imm3": ("IMM with turns", GREEN),
+    "rbpf": ("RBPF", BLUE),
+}
 
 
 def curve(work: Work, scores: Sequence["Score"], ekf: float, pf: float) -> None:
@@ -27,13 +32,14 @@ def curve(work: Work, scores: Sequence["Score"], ekf: float, pf: float) -> None:
             ax.plot(GRID, score.curve, color=colours[name], label=name)
             ax.plot(GRID[score.best], score.curve[score.best], "o", color=colours[name])
         levels = (
-            (ekf, "published EKF and UKF, 186.4 m"),
-            (float(scores[0].rmse["raw"].value), "no filter, 141.4 m"),
-            (pf, "published particle filter, 135.4 m"),
+            (ekf, "published EKF, UKF 186.4 m"),
+            (float(scores[0].rmse["raw"].value), "no filter 141.4 m"),
+            (pf, "published particle filter 135.4 m"),
         )
         for k, (level, text) in enumerate(levels):
             ax.axhline(level, color=INK, lw=1.0, ls=(0, (1, 2)) if k == 1 else (0, (5, 3)), zorder=1)
-            ax.text(0.105, level, text, va="top" if k == 2 else "bottom", color=INK, fontsize=8.5)
+            side, shift = ("top", -2) if k == 2 else ("bottom", 1)
+            ax.annotate(text, (0.105, level), (0, shift), textcoords="offset points", va=side, fontsize=8.5)
         ax.set(xscale="log", yscale="log", xlim=(0.1, 500), ylim=(95, 600))
         ax.yaxis.set_major_locator(FixedLocator([100, 120, 150, 200, 300, 400, 600]))
         ax.yaxis.set_minor_locator(NullLocator())
@@ -54,7 +60,7 @@ def ratios(work: Work, scores: Sequence["Score"], published: float) -> None:
             ("Over the best-tuned KF", r"Over the nominal KF, $\sigma_a$ = 3 m/s²"),
             strict=True,
         ):
-            for name, dy in (("imm", 0.13), ("rbpf", -0.13)):
+            for name, dy in (("imm", 0.2), ("imm3", 0.0), ("rbpf", -0.2)):
                 each = [score.ratio[name, opponent] for score in scores]
                 value = np.array([float(ratio.value) for ratio in each])
                 below = value - [float(ratio.low) for ratio in each]
@@ -68,12 +74,13 @@ def ratios(work: Work, scores: Sequence["Score"], published: float) -> None:
             ax.set(xlabel="RMSE ratio", title=title, xlim=(0.25, 1.05))
             ax.grid(axis="y", visible=False)
         axes[0].set_yticks(rows, [score.case.name for score in scores])
-        axes[0].tick_params(axis="y", length=0)
+        for ax in axes:
+            ax.tick_params(axis="y", length=0)
         axes[0].text(
             published - 0.01, rows[0] + 0.62, "published 0.726", ha="right", va="center", fontsize=8.5
         )
         axes[0].set_ylim(-0.6, len(scores) - 0.1)
-        drawn.legend(*axes[1].get_legend_handles_labels(), loc="outside lower center", ncols=2)
+        drawn.legend(*axes[1].get_legend_handles_labels(), loc="outside lower center", ncols=3)
 
 
 def flight(work: Work, score: "Score", runs: int) -> None:
@@ -93,11 +100,13 @@ def flight(work: Work, score: "Score", runs: int) -> None:
                 right.axvspan(begin, begin + leg.duration_s, color=PALE, lw=0)
             begin += leg.duration_s
         time = T * (3 + np.arange(len(score.time["kf"])))
-        for name, (label, colour) in _FILTERS.items():
+        for name in ("kf", "imm", "rbpf"):
+            label, colour = _FILTERS[name]
             width = 1.2 if name != "rbpf" else 1.8
             right.plot(time, np.sqrt(score.time[name] / runs), color=colour, label=label, lw=width)
         right.axhline(float(score.rmse["raw"].value), color=INK, lw=1.0, ls=(0, (1, 2)))
-        right.set(xlabel="time, s (shaded: manoeuvres)", ylabel="RMSE, m", xlim=(0, begin), ylim=(0, None))
+        right.set(xlabel="time, s (shaded: manoeuvres)", ylabel="RMSE, m", xlim=(0, begin))
+        right.set_ylim(0, 1.15 * right.get_ylim()[1])
         right.set_title(f"Error along it, {runs} runs (dotted: no filter)")
         right.legend(loc="upper right", ncols=3, columnspacing=1.2)
 
@@ -114,7 +123,7 @@ def convergence(work: Work, ratio: Mapping[tuple[str, int], Interval]) -> None:
             floor = 0.01
             bounds = [value - np.maximum(low, floor), high - value]
             ax.errorbar(
-                counts,
+                counts * (0.97 if name == "prior" else 1.03),  # side by side where they are equal
                 value,
                 yerr=np.maximum(bounds, 0),
                 fmt="o-",

@@ -19,7 +19,7 @@ from radar_console.estimation import (
     samples,
     unscented,
 )
-from radar_console.estimation.filters import KALMAN
+from radar_console.estimation.filters import EXTENDED, KALMAN
 from radar_console.estimation.gaussian import Array, Gaussian, apply, root
 from radar_console.studies import trajectories
 from radar_console.studies.work import Arrays, generator
@@ -123,23 +123,36 @@ def kalman_filters(seen: Measured, T: float, sigma: Array) -> Array:
     return np.stack(filtered)
 
 
-def interacting(seen: Measured, T: float) -> Array:
-    """Filtered positions (scans − 2, runs, 2) of the IMM of constant velocity and constant acceleration."""
+def interacting(seen: Measured, T: float, turns: bool = False) -> Array:
+    """Filtered positions (scans − 2, runs, 2) of an IMM.
+
+    Its modes are constant velocity (0.1 m/s²) and constant acceleration (10 m/s² a scan); with `turns` also a
+    coordinated turn (1 m²/s³, 10⁻⁴ rad²/s³), for which the filter is the extended one.
+    """
     straight = motion.linear(*motion.constant_velocity(T, 0.1**2, piecewise=True))
-    # The straight mode has no acceleration; 1e-9 keeps its covariance regular.
-    straight = motion.embed(straight, range(4), np.full(6, 1e-9))
     curved = motion.linear(*motion.constant_acceleration(T, 10.0**2, piecewise=True))
+    # What a mode lacks is zero in it; 1e-9 keeps its covariance regular.
+    size = 7 if turns else 6
+    none = np.full(size, 1e-9)
+    models = [motion.embed(straight, range(4), none), motion.embed(curved, range(6), none)]
+    if turns:
+        models.append(motion.embed(motion.coordinated_turn(T, 1.0, 1e-4), [0, 1, 2, 3, 6], none))
     first = start(seen, T)
-    mean, cov = np.zeros((*first.mean.shape[:-1], 6)), np.zeros((*first.mean.shape[:-1], 6, 6))
+    mean, cov = np.zeros((*first.mean.shape[:-1], size)), np.zeros((*first.mean.shape[:-1], size, size))
     mean[..., :4], cov[..., :4, :4] = first.mean, first.cov
-    cov[..., range(4, 6), range(4, 6)] = 10.0**2
-    modes = imm.start(Gaussian(mean, cov), np.array([0.5, 0.5]))
-    switching = np.array([[0.98, 0.02], [0.02, 0.98]])
+    cov[..., range(4, size), range(4, size)] = [100.0, 100.0, 0.003][: size - 4]
+    modes = imm.start(Gaussian(mean, cov), np.array([0.5, 0.25, 0.25] if turns else [0.5, 0.5]))
+    switching = np.array(
+        [[0.96, 0.02, 0.02], [0.04, 0.94, 0.02], [0.04, 0.02, 0.94]]
+        if turns
+        else [[0.98, 0.02], [0.02, 0.98]]
+    )
+    filter = EXTENDED if turns else KALMAN
     filtered = []
     for k in range(2, len(seen.z)):
         sensing = measurement.position(seen.R if seen.R.ndim == 2 else seen.R[k])
-        modes = imm.predict(modes, [straight, curved], switching, KALMAN)
-        modes, _ = imm.update(modes, seen.z[k], sensing, KALMAN)
+        modes = imm.predict(modes, models, switching, filter)
+        modes, _ = imm.update(modes, seen.z[k], sensing, filter)
         filtered.append(imm.estimate(modes).mean[..., :2])
     return np.stack(filtered)
 
@@ -175,6 +188,7 @@ def compare(case: Case, runs: range, seed: int, particles: int) -> Arrays:
     errors = {
         "kf": squared(kalman_filters(seen, case.T, GRID), seen),
         "imm": squared(interacting(seen, case.T), seen),
+        "imm3": squared(interacting(seen, case.T, turns=True), seen),
         "rbpf": squared(
             regime_particles(seen, case.T, seed, runs, particles).mean[..., :2],
             seen,
@@ -204,13 +218,13 @@ def linear_case(runs: range, seed: int) -> Arrays:
 
 # Particle filters with the single model of the Kalman filter, on truth from that model.
 MATCHED_COUNTS = (100, 1_000, 10_000)
-_SCANS = 60
+_SCANS, _SIGMA = 60, 10.0
 
 
 def matched(count: int, runs: range, seed: int) -> Arrays:
     """Mean squared errors by run, m², of the KF and of particle filters of `count` with either proposal."""
     T, R = 4.0, 100.0**2 * np.eye(2)
-    F, Q = motion.constant_velocity(T, NOMINAL**2, piecewise=True)
+    F, Q = motion.constant_velocity(T, _SIGMA**2, piecewise=True)
     model, sensing = motion.linear(F, Q), measurement.position(R)
     L = root(Q)
     x, z = [], []
@@ -223,7 +237,7 @@ def matched(count: int, runs: range, seed: int) -> Arrays:
         z.append(np.array(states)[:, :2] + 100.0 * rng.standard_normal((_SCANS + 2, 2)))
     seen = Measured(np.stack(x, axis=1)[..., :2], np.stack(z, axis=1), R)
     first = start(seen, T)
-    found = {"kf": kalman_filters(seen, T, np.array([NOMINAL]))[:, 0]}
+    found = {"kf": kalman_filters(seen, T, np.array([_SIGMA]))[:, 0]}
     for number, name in enumerate(("prior", "optimal")):
         rng = generator(seed, _SEED_OF_MATCHED, runs.start, count, number)
         cloud, filtered = samples.draw(first, count, rng), []
@@ -238,11 +252,11 @@ def matched(count: int, runs: range, seed: int) -> Arrays:
     return {name: squared(estimate, seen).mean(axis=0) for name, estimate in found.items()}
 
 
-BOOTSTRAP = 5_000
+BOOTSTRAP = (500, 5_000)
 LOST = 1_000.0  # m at the end: the filter has lost its target
 
 
-def bootstrap_regimes(case: Case, runs: range, seed: int) -> Arrays:
+def bootstrap_regimes(case: Case, count: int, runs: range, seed: int) -> Arrays:
     """Everything drawn, from the prior: regime, acceleration, position and velocity.
 
     The regime is left in a scan with 0.05 (straight) or 0.15 (manoeuvre); accelerations are uniform, 70 %
@@ -253,8 +267,8 @@ def bootstrap_regimes(case: Case, runs: range, seed: int) -> Arrays:
     mean squared error by run, m², and the distance at the end, m
     """
     seen, T = measure(case, runs, seed), case.T
-    rng = generator(seed, _SEED_OF_FILTER, CASES.index(case), runs.start)
-    x = samples.draw(start(seen, T), BOOTSTRAP, rng).states
+    rng = generator(seed, _SEED_OF_FILTER, CASES.index(case), count, runs.start)
+    x = samples.draw(start(seen, T), count, rng).states
     shape = x.shape[:-1]
     bent = np.zeros(shape, np.bool_)
     side: Array = np.zeros(shape)
@@ -268,7 +282,7 @@ def bootstrap_regimes(case: Case, runs: range, seed: int) -> Arrays:
         along = np.where(leave, np.where(bent & ~turns, 6.0 * size, 0.0), along)
         x = _steer(x, side, along, np.where(bent, 6.0, 0.1), T, rng)
         sensing = measurement.position(seen.R if seen.R.ndim == 2 else seen.R[k])
-        cloud, _ = samples.update(samples.Samples(x, np.full(shape, -np.log(BOOTSTRAP))), seen.z[k], sensing)
+        cloud, _ = samples.update(samples.Samples(x, np.full(shape, -np.log(count))), seen.z[k], sensing)
         filtered.append(np.einsum("k...,k...i->...i", cloud.weights, x[..., :2]))
         carried = np.concatenate([x, np.stack([bent, side, along], axis=-1)], axis=-1)
         carried = samples.resample(samples.Samples(carried, cloud.log_weights), rng, below=1.1).states

@@ -7,25 +7,24 @@ only, so one worker finds what ten do.
 """
 
 import hashlib
-import multiprocessing
 import os
-import signal
 import sys
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from concurrent.futures import Future, ProcessPoolExecutor, as_completed
 from dataclasses import dataclass, field
 from functools import lru_cache
 from pathlib import Path
 from types import ModuleType
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, cast
 
 import numpy as np
 from numpy.random import Generator, SeedSequence, default_rng
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
+from radar_console.core.errors import RadarConsoleError
 from radar_console.estimation.gaussian import Array
+from radar_console.evaluation.workers import Task, inline, processes
 
 Arrays = dict[str, Array]
 _PACKAGE = __name__.partition(".")[0]
@@ -82,28 +81,29 @@ class Work:
         return [_kept(file) for file in files]
 
     def _results(self, parts: Mapping[int, Part]) -> Iterator[tuple[int, Arrays]]:
-        """Number and result of each part, as they are finished."""
-        if self.jobs == 1 or len(parts) == 1:
-            for k, part in parts.items():
-                yield k, part.function(*part.arguments)
-            return
+        """Number and result of each part, as they are finished; those that fail do not end the others."""
         # The longest first: none is left alone at the end.
         order = sorted(parts, key=lambda k: -parts[k].weight)
-        context = multiprocessing.get_context("spawn")
-        pool = ProcessPoolExecutor(min(self.jobs, len(parts)), context, initializer=_die_quietly)
-        try:
-            numbers: dict[Future[Arrays], int] = {
-                pool.submit(parts[k].function, *parts[k].arguments): k for k in order
-            }
-            for done in as_completed(numbers):
-                yield numbers.pop(done), done.result()
-        finally:
-            pool.shutdown(wait=False, cancel_futures=True)
+        tasks = [Task(k, {"part": parts[k]}, 0) for k in order]
+        alone = self.jobs == 1 or len(parts) == 1
+        failed = []
+        for task, outcome in (inline if alone else processes(self.jobs))(_make, tasks):
+            if outcome.error:
+                failed.append(f"{_name(parts[task.number])}: {outcome.error}")
+            else:
+                yield task.number, cast(Arrays, outcome.figures)
+        if failed:
+            what = f"{len(failed)} of {len(tasks)} parts failed; the others are kept"
+            raise RadarConsoleError("\n  ".join([what, *failed]))
 
 
-def _die_quietly() -> None:
-    """Ctrl+C reaches all processes; the first of them says what there is to say."""
-    signal.signal(signal.SIGINT, signal.SIG_DFL)
+def _make(task: Mapping[str, Any], _: int) -> Any:
+    part: Part = task["part"]
+    return part.function(*part.arguments)
+
+
+def _name(part: Part) -> str:
+    return f"{part.function.__name__}{part.arguments}"
 
 
 def _digest(part: Part) -> str:
@@ -115,9 +115,9 @@ def _digest(part: Part) -> str:
 @lru_cache
 def _source(module: str) -> str:
     """A digest of the code of a module and of what it uses of this package, directly or not."""
-    used: set[str] = set()
+    used = {__name__}  # how work is shared out changes no result
     _collect(module, used)
-    used.discard(__name__)  # how work is shared out changes no result
+    used.remove(__name__)
     every = hashlib.sha256()
     for name in sorted(used):
         every.update(Path(str(sys.modules[name].__file__)).read_bytes())

@@ -13,7 +13,7 @@ Command = Callable[..., int]
 
 
 def test_every_command_has_help_with_an_example(command: Command, capsys: pytest.CaptureFixture[str]) -> None:
-    for name in ("", "console", "track", "simulate", "study", "info", "scenarios", "schema"):
+    for name in ("", "console", "track", "simulate", "evaluate", "study", "info", "scenarios", "schema"):
         assert command(*([name] if name else []), "--help") == 0
         assert "Example" in capsys.readouterr().out
 

@@ -81,8 +81,8 @@ def test_differences_and_ratios_of_pairs_are_scipy_s():
 def test_they_hold_the_truth_as_often_as_they_say():
     """Of 2,000 samples of 12 runs; four standard errors of a part are 2 %.
 
-    The bootstrap of so few skewed values is not exact: the mean of 12 exponential ones is held in 91 to
-    95 %, and without the expanded quantiles in 88 %.
+    The bootstrap of so few skewed values is not exact: the mean of 12 exponential ones is held in 91 %, and
+    without the expanded quantiles in 87 %.
     """
     rng = np.random.default_rng(7)
     gaussian, skewed = rng.normal(size=(2000, 12)), rng.exponential(size=(2000, 12))
@@ -94,7 +94,7 @@ def test_they_hold_the_truth_as_often_as_they_say():
     drawn = intervals.bootstrap(intervals.average, gaussian, rng=rng, resamples=600)
     assert held(drawn, 0.0) == pytest.approx(0.95, abs=0.025)
     drawn = intervals.bootstrap(intervals.average, skewed, rng=rng, resamples=600)
-    assert 0.9 < held(drawn, 1.0) < 0.97
+    assert held(drawn, 1.0) == pytest.approx(0.91, abs=0.02)
     assert 0.92 < held(intervals.median(gaussian, rng, resamples=600), 0.0) < 1.0
 
 

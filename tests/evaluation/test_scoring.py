@@ -1,5 +1,7 @@
 """The figures of a run: by hand, against the metrics they stand for, and from a scenario."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 from small_scenarios import small_raw
@@ -21,6 +23,11 @@ def table_of(dtype, rows):
     if dtype is TRACK:
         table["status"] = TrackStatus.CONFIRMED
     return table
+
+
+def test_every_column_is_explained():
+    page = (Path(__file__).parents[2] / "docs" / "evaluation.md").read_text(encoding="utf-8")
+    assert [metric.name for metric in RUN_METRICS if f"`{metric.name}`" not in page] == []
 
 
 def test_by_hand():

@@ -102,7 +102,7 @@ def small(monkeypatch, tmp_path):
     monkeypatch.setattr(filter_rmse, "_FRAGILE", (Case("FIGHTER"),))
     monkeypatch.setattr(filter_rmse, "_PARTICLES", 50)
     monkeypatch.setattr(filter_runs, "MATCHED_COUNTS", (100, 1_000))
-    monkeypatch.setattr(filter_runs, "BOOTSTRAP", 500)
+    monkeypatch.setattr(filter_runs, "BOOTSTRAP", (500,))
     monkeypatch.setattr(resampling, "COUNTS", (100, 1_000))
     return tmp_path
 
@@ -129,7 +129,7 @@ def test_the_study_in_small(small):
 def test_resampling_in_small(small):
     work = Work(small, 6, 1)
     found = {each.quantity: each.ours for each in resampling.run(work)}
-    assert len(found) == 4 * 2 * 4
+    assert len(found) == 5 * 2 * 4
     for scheme in ("systematic", "stratified", "residual"):
         assert found[f"scatter of the mean, {scheme}, N = 1,000"] < 0.8
         assert found[f"RMSE / KF, {scheme}, N = 1,000"] < 1.2
