@@ -75,8 +75,9 @@ def problem(point: Point, rng: Generator) -> Problem:
     seen = truth[rng.random(point.targets) < _P_D]
     seen = seen + SD * rng.standard_normal(seen.shape)
     reach = 2.0 * RADIUS
-    box = np.array([[truth[0, 0] - reach, -reach], [truth[-1, 0] + reach, reach]])
-    false = rng.uniform(*box, (rng.poisson(_DENSITY * float(np.prod(box[1] - box[0]))), 2))
+    width = truth[-1, 0] + 2.0 * reach
+    false = rng.random((rng.poisson(_DENSITY * width * 2.0 * reach), 2))
+    false = (false - [0.0, 0.5]) * [width, 2.0 * reach] - [reach, 0.0]
     plots = np.concatenate([seen, false])
     d2 = np.sum((plots - predicted[:, None]) ** 2, axis=-1) / (1.6 * SD**2)
     w = _P_D * np.exp(-0.5 * d2) / (2.0 * np.pi * 1.6 * SD**2) / _DENSITY

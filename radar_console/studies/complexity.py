@@ -127,7 +127,7 @@ def _growth(
     name = f"time, {_TITLES[what]}" if way == what else f"joint events, {_TITLES[way]}"
     layout = "abreast" if points[0].layout == "abreast" else "in groups of four"
     if law == "per target":
-        fitted = Interval(*(np.exp(bound) for bound in fitted[:3]), fitted.runs)
+        fitted = Interval(np.exp(fitted.value), np.exp(fitted.low), np.exp(fitted.high), fitted.runs)
         verdict = "exponential, as the paper says"
         return found(f"{name}, {layout}: factor for one more target", "", fitted, verdict)
     verdict = {-1.0: "less than linear", 0.0: "linear", 1.0: "more than linear, not exponential"}[
@@ -176,7 +176,13 @@ def draw_targets(work: Work, results: Results) -> None:
             x = np.array([point.targets for point in points], float)
             for way in WAYS:
                 _line(ax, x, [results[point] for point in points], way)
-            ax.set(xscale="log", yscale="log", ylim=(1e-3, 1e6), xlabel="targets", title=title)
+            ax.set(
+                xscale="log",
+                yscale="log",
+                ylim=(1e-3, 1e6),
+                xlabel="targets (dashed: from the count of events)",
+                title=title,
+            )
             ax.xaxis.set_major_formatter("{x:g}")
             ax.set_xticks([2, 4, 8, 16, 32, 64, 128] if points is ABREAST else [4, 8, 16, 32, 64, 128])
             ax.minorticks_off()
@@ -191,7 +197,12 @@ def draw_overlap(work: Work, results: Results) -> None:
         x, n = np.array(SPACINGS), CROWDS[0]
         for way in WAYS:
             _line(left, x, [results[Point("abreast", n, spacing)] for spacing in SPACINGS], way)
-        left.set(yscale="log", ylim=(1e-3, 1e6), ylabel="processor time of a scan, ms", title=f"{n} targets")
+        left.set(
+            yscale="log",
+            ylim=(1e-3, 1e6),
+            ylabel="processor time of a scan, ms",
+            title=f"{n} targets in a line",
+        )
         _turn(left, 2.5)
         for n, colour in zip(CROWDS, (BLUE, INK, GREY), strict=True):
             each = [results[Point("abreast", n, spacing)]["rough"] for spacing in SPACINGS]
@@ -200,7 +211,7 @@ def draw_overlap(work: Work, results: Results) -> None:
             middle, low, high = np.maximum(quarters.T, 1e-12)
             right.plot(x, middle, "o-", color=colour, ms=4, label=f"{n} targets")
             right.fill_between(x, low, high, color=colour, alpha=0.15, lw=0)
-        right.set(yscale="log", ylim=(1e-6, 1.0), ylabel="largest error of a probability")
+        right.set(yscale="log", ylim=(1e-6, 1.0), ylabel="largest error, median and quartiles")
         right.set_title("Error of belief propagation")
         right.legend(loc="lower right")
         for ax in (left, right):
