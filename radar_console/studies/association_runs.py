@@ -167,7 +167,9 @@ def events(given: Problem) -> float:
         ones = jpda.sparse(
             np.ones(t + 1), given.columns, row, given.col[: len(row)], np.ones(len(row)), _AMPLE
         )
-        count = count / float(ones.p_miss[t]) if not ones.approximate.any() else np.nan
+        if ones.approximate.any():
+            return np.nan
+        count /= float(ones.p_miss[t])
     return count
 
 

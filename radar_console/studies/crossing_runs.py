@@ -44,7 +44,7 @@ class Cell(NamedTuple):
     sd : of a measured position in each axis, m
     density : of the clutter, per km²
     initiation : new tracks may start beside the two given
-    where : "published", they miss each other by 420 m; "meeting", the second target is moved so that they
+    where : "published", they miss each other by 415 m; "meeting", the second target is moved so that they
         meet; "apart", it is moved by 30 km, and they don't
     """
 
