@@ -91,10 +91,10 @@ def findings(
             ]
             rows.append(found(f"GOSPA, JPDA / {other}, {density:g}/km²", "", ratio, verdict))
     for (name, density), every in figures.items():
-        best = int(np.argmin(every.value))
+        least = every.value == np.min(every.value)
         for k, tracker in enumerate(names):
             one = Interval(every.value[k], every.low[k], every.high[k], every.runs)
-            verdict = "the least" if k == best and np.ptp(every.value) > 0.0 else "as measured"
+            verdict = "the least" if least[k] and np.sum(least) == 1 else "as measured"
             unit = "m" if name in (*_GOSPA, "ospa_m") else ""
             rows.append(found(f"{_TITLES[name]}, {tracker}, {density:g}/km²", unit, one, verdict))
     return rows
