@@ -18,8 +18,8 @@ longer than the crossing. Of each run:
 
 Initiation in 6.7 per km² is slow: a twentieth of the runs. Beside: the Kalman filter; GNN with a gate of 0.99
 in place of 0.9999; process noise for straight courses (1 in place of 30 m²/s³). What is due to the crossing
-is seen beside the same courses 30 km apart, and meeting at 0 m. Intervals are Wilson's, those of differences
-Newcombe's for the same runs.
+is seen beside the same courses moved aside, 15 km apart at the least, and meeting at 0 m. Intervals are
+Wilson's, those of differences Newcombe's for the same runs.
 
 Running time: 200 runs take some 20 minutes on one core.
 """

@@ -65,8 +65,9 @@ def tracks(work: Work, results: Sequence["Played"]) -> None:
     centre = crossing_runs.published(MEETING)[:, :2].mean(axis=0) / KM
     with figure(work, "crossing-tracks", 3, size=(9.6, 4.3)) as (drawn, axes):
         _scene(axes[0], centre)
+        drawn.suptitle(f"Run {run} of seed {work.seed}, {_SHOWN.name}", fontsize=9.5, x=0.01, ha="left")
         for ax, (tracker, number) in zip(axes[1:], (("GNN", 19), ("JPDA", 20)), strict=True):
-            ax.plot(*every.T, ".", color=GREY, ms=1.6, mew=0, alpha=0.55, label="false plots")
+            ax.plot(*every.T, ".", color=GREY, ms=2.4, mew=0, alpha=0.6, label="false plots")
             ax.plot(*real.T, "x", color=INK, ms=4, mew=0.9, label="plots of the targets")
             rows = crossing_runs.rows(whole, _SHOWN, tracker, work.seed + run)
             for number_of, colour in ((0, ORANGE), (1, BLUE)):
@@ -95,7 +96,9 @@ def _scene(ax: Axes, centre: Array) -> None:
     ax.plot(0, 0, "^", color=INK)
     ax.annotate("radar", (0, 0), (7, -3), textcoords="offset points")
     ax.plot(*centre, "s", mfc="none", color=INK, ms=9)
-    ax.set(xlabel="east, km", ylabel="north, km", title="The scene (after figure 18)", aspect="equal")
+    ax.set(xlabel="east, km", ylabel="north, km", title="The scene (after figure 18)")
+    ax.set_aspect("equal", adjustable="datalim")
+    ax.set_box_aspect(1.0)
 
 
 def _plots(played: tracked.Played) -> Array:

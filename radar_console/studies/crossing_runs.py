@@ -45,7 +45,7 @@ class Cell(NamedTuple):
     density : of the clutter, per km²
     initiation : new tracks may start beside the two given
     where : "published", they miss each other by 415 m; "meeting", the second target is moved so that they
-        meet; "apart", it is moved by 30 km, and they don't
+        meet; "apart", it is moved aside, and they stay 15 km from each other
     """
 
     sd: float
