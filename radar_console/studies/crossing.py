@@ -40,7 +40,13 @@ RUNS = 200
 SIGMAS = (50.0, 7.07)
 DENSITIES = (0.1, 1.0, 2.0, 6.7)
 PAPER = DENSITIES[-1]
-EVENTS = {"swap": "swap", "lost": "lost target", "extra": "extra track", "kept": "both tracks kept"}
+EVENTS = {
+    "swap": "swap",
+    "lost": "lost target",
+    "extra": "extra track",
+    "kept": "both tracks kept",
+    "early": "a track away 20 s before the meeting",
+}
 
 _CHUNK, _CHUNK_STARTED, _CHUNK_DENSE = 20, 5, 1  # runs of a part
 _MAIN = ("GNN", "JPDA")
@@ -142,12 +148,15 @@ def _claims(played: Played) -> list[Finding]:
     for (event, tracker), published in _PUBLISHED.items():
         if cell.initiation == (event == "extra"):
             ours = probability(played, event, tracker)
-            agrees = (float(ours.value) > 0.5) == (published > 0.5)
-            verdict = f"{'as' if agrees else 'not as'} published of one run"
+            side = float(ours.beyond(0.5))
+            verdict = "too few runs to tell"
+            if side:
+                verdict = f"{'as' if (side > 0.0) == (published > 0.5) else 'not as'} published of one run"
             name = f"{EVENTS[event]}, {tracker}, {cell.name}"
             rows.append(found(name, "", ours, verdict, published))
     if not cell.initiation:
         rows.append(_difference(played, "kept", "JPDA", "GNN"))
+        rows += _compared(played, "early", *_MAIN)
     return rows
 
 

@@ -41,10 +41,14 @@ def probabilities(work: Work, results: Sequence["Played"]) -> None:
                 at = np.array([one.cell.density for one in cells]) * 1.10 ** (number - 1.5)
                 wide = sd > 10.0
                 ax.errorbar(
-                    at, value, np.abs([value - low, high - value]), fmt="o-" if wide else "s--",
-                    mfc=_COLOURS[tracker] if wide else "white", color=_COLOURS[tracker], ms=4.5, lw=1.2,
-                    capsize=2, label=f"{tracker}, σ = {sd:g} m",
+                    at, value, np.abs([value - low, high - value]), fmt="o" if wide else "s",
+                    mfc=_COLOURS[tracker] if wide else "white", color=_COLOURS[tracker], ms=4.5,
+                    elinewidth=1.2, capsize=2, label=f"{tracker}, σ = {sd:g} m",
                 )  # fmt: skip
+                # A few runs at the last density hang on no line.
+                most = np.array([one.events[event].shape[1] for one in cells])
+                on = most == most.max()
+                ax.plot(at[on], value[on], "-" if wide else "--", color=_COLOURS[tracker], lw=1.2, zorder=1)
             runs = sorted({one.events[event].shape[1] for one in chosen})
             said = f"{runs[-1]} runs" if len(runs) == 1 else f"{runs[-1]} runs, {runs[0]} at 6.7"
             ax.set(xscale="log", xlabel=f"clutter, per km² and scan\n({said})", title=title, ylim=(-3, 103))
@@ -63,9 +67,8 @@ def tracks(work: Work, results: Sequence["Played"]) -> None:
     bare = tracked.play(crossing_runs.scene(_SHOWN._replace(density=0.0)), generator(work.seed, run))
     real, every = _plots(bare), _plots(whole)
     centre = crossing_runs.published(MEETING)[:, :2].mean(axis=0) / KM
-    with figure(work, "crossing-tracks", 3, size=(9.6, 4.3)) as (drawn, axes):
+    with figure(work, "crossing-tracks", 3, size=(9.6, 4.0)) as (drawn, axes):
         _scene(axes[0], centre)
-        drawn.suptitle(f"Run {run} of seed {work.seed}, {_SHOWN.name}", fontsize=9.5, x=0.01, ha="left")
         for ax, (tracker, number) in zip(axes[1:], (("GNN", 19), ("JPDA", 20)), strict=True):
             ax.plot(*every.T, ".", color=GREY, ms=2.4, mew=0, alpha=0.6, label="false plots")
             ax.plot(*real.T, "x", color=INK, ms=4, mew=0.9, label="plots of the targets")
@@ -78,9 +81,9 @@ def tracks(work: Work, results: Sequence["Played"]) -> None:
             ax.set(xlim=centre[0] + _HALF * np.array([-1, 1]), ylim=centre[1] + _HALF * np.array([-1, 1]))
             ax.set(xlabel="east, km", title=f"{tracker} (after figure {number})", aspect="equal")
         axes[1].set_ylabel("north, km")
-        drawn.legend(
-            *axes[1].get_legend_handles_labels(), loc="outside lower center", ncols=4, markerscale=1.5
-        )
+        title = f"All scans of run {run} of seed {work.seed}, {_SHOWN.name}"
+        handles = axes[1].get_legend_handles_labels()
+        drawn.legend(*handles, title=title, loc="outside lower center", ncols=4, markerscale=1.6)
 
 
 def _scene(ax: Axes, centre: Array) -> None:
@@ -92,7 +95,7 @@ def _scene(ax: Axes, centre: Array) -> None:
             [crossing_runs.published(MEETING + time)[number, :2] for time in (-BEFORE, crossing_runs.AFTER)]
         )
         ax.plot(*part.T / KM, color=colour, lw=3.0, solid_capstyle="butt")
-        ax.annotate(f"{number + 1}", path[0], (5, 0), textcoords="offset points", color=colour, weight="bold")
+        ax.annotate(f"{number + 1}", path[0], (5, 0), textcoords="offset points", color=colour)
     ax.plot(0, 0, "^", color=INK)
     ax.annotate("radar", (0, 0), (7, -3), textcoords="offset points")
     ax.plot(*centre, "s", mfc="none", color=INK, ms=9)
