@@ -31,7 +31,8 @@ def probabilities(work: Work, results: Sequence["Played"]) -> None:
     with figure(work, "crossing-probabilities", 3, size=(9.6, 4.2), sharey=True) as (drawn, axes):
         for ax, (event, title) in zip(axes, panels, strict=True):
             chosen = [each for each in plain if each.cell.initiation == (event == "extra")]
-            for number, (tracker, sd) in enumerate((t, sd) for t in _COLOURS for sd in (50.0, 7.07)):
+            every = sorted({each.cell.sd for each in chosen}, reverse=True)
+            for number, (tracker, sd) in enumerate((t, sd) for t in _COLOURS for sd in every):
                 cells = [each for each in chosen if each.cell.sd == sd]
                 each = [intervals.proportion(one.of(event, tracker)) for one in cells]
                 value = 100.0 * np.array([float(one.value) for one in each])
