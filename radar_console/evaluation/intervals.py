@@ -8,6 +8,8 @@ many. Of a single run the bounds are NaN.
     statistics curriculum, The American Statistician 69 (4), 2015 ("expanded percentile interval").
 [2] Wilson, Probable inference, the law of succession, and statistical inference, Journal of the
     American Statistical Association 22, 1927.
+[3] Newcombe, Improved confidence intervals for the difference between binomial proportions based on
+    paired data, Statistics in Medicine 17, 1998.
 """
 
 from collections.abc import Callable
@@ -107,6 +109,43 @@ def proportion(hits: ArrayLike, runs: int | None = None, level: float = LEVEL) -
     # The bounds of none and of all are 0 and 1, not a rounding beside them.
     low, high = np.where(count == 0, 0.0, centre - half), np.where(count == n, 1.0, centre + half)
     return Interval(p, low[()], high[()], n)
+
+
+def paired_proportions(hits: ArrayLike, against: ArrayLike, level: float = LEVEL) -> Interval:
+    """How much likelier an event is under one setting than under another on the same runs [3, method 10].
+
+    Unlike a bootstrap it does not take what never differed for what never will.
+
+    Parameters
+    ----------
+    hits, against : (n,) whether each run was one, the same run at the same place
+
+    Example: of 50 runs, 36 with both, 12 with the first alone, 2 with the second alone: 0.2 with bounds
+    0.0569 and 0.3404.
+    """
+    first, second = np.asarray(hits, np.bool_), np.asarray(against, np.bool_)
+    if first.shape != second.shape or first.ndim != 1:
+        raise ValueError(f"paired runs must be two rows of the same length: {first.shape}, {second.shape}")
+    n = len(first)
+    p, q = proportion(first, level=level), proportion(second, level=level)
+    value = np.asarray(float(p.value) - float(q.value))
+    if n < 2:
+        return _unsure(value, n)
+    both, neither = float(np.sum(first & second)), float(np.sum(~first & ~second))
+    one, other = float(np.sum(first & ~second)), float(np.sum(~first & second))
+    cross = both * neither - one * other
+    if cross > 0.0:
+        cross = max(cross - 0.5 * n, 0.0)  # for continuity
+    margins = (both + one) * (other + neither) * (both + other) * (one + neither)
+    phi = cross / np.sqrt(margins) if margins else 0.0
+
+    def reach(x: Array, y: Array) -> Array:
+        result: Array = np.sqrt(np.maximum(x**2 - 2.0 * phi * x * y + y**2, 0.0))
+        return result
+
+    low = value - reach(p.value - p.low, q.high - q.value)
+    high = value + reach(p.high - p.value, q.value - q.low)
+    return Interval(value[()], low[()], high[()], n)
 
 
 def paired_difference(

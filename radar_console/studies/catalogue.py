@@ -17,7 +17,16 @@ from radar_console.core.errors import RadarConsoleError
 from radar_console.studies.findings import Finding
 from radar_console.studies.work import Work
 
-NAMES = ("filter-rmse", "resampling", "seven-targets", "twenty-five", "arpa")
+NAMES = (
+    "seven-targets",
+    "twenty-five",
+    "filter-rmse",
+    "crossing",
+    "resampling",
+    "ospa-clutter",
+    "complexity",
+    "arpa",
+)
 
 
 class Study(NamedTuple):

@@ -152,3 +152,37 @@ def test_a_run_that_says_nothing_is_not_passed_over():
 def test_samples_of_other_runs_are_no_pairs():
     with pytest.raises(ValueError, match="the same runs"):
         intervals.paired_difference([1.0, 2.0], [1.0, 2.0, 3.0], np.random.default_rng(1))
+
+
+def paired(both, first, second, neither):
+    hits = np.repeat([True, True, False, False], [both, first, second, neither])
+    return hits, np.repeat([True, False, True, False], [both, first, second, neither])
+
+
+def test_paired_proportions_are_newcombe_s():
+    """His table III: 36 pairs of both, 12 and 2 of one alone."""
+    found = intervals.paired_proportions(*paired(36, 12, 2, 0))
+    assert found.value == pytest.approx(0.2)
+    assert (found.low, found.high) == pytest.approx((0.0569, 0.3404), abs=5e-5)
+
+
+def test_paired_proportions_are_odd_and_sure_of_nothing_that_never_differed():
+    one, other = paired(5, 7, 1, 20)
+    there, back = intervals.paired_proportions(one, other), intervals.paired_proportions(other, one)
+    assert (there.low, there.high) == pytest.approx((-back.high, -back.low))
+    none = intervals.paired_proportions(np.zeros(100), np.zeros(100))
+    assert none.low < -0.02
+    assert none.high > 0.02
+    with pytest.raises(ValueError, match="same length"):
+        intervals.paired_proportions(np.zeros(3), np.zeros(4))
+
+
+def test_paired_proportions_hold_the_truth_as_often_as_they_say():
+    rng = np.random.default_rng(4)
+    held = 0
+    for _ in range(400):
+        first = rng.random(60) < 0.3
+        second = np.where(rng.random(60) < 0.6, first, rng.random(60) < 0.1)
+        found = intervals.paired_proportions(first, second)
+        held += found.low <= 0.3 - (0.6 * 0.3 + 0.4 * 0.1) <= found.high
+    assert 0.92 < held / 400 < 0.99  # 0.95 and some three standard errors
