@@ -106,7 +106,7 @@ def draw(work: Work, results: Mapping[str, Arrays]) -> None:
         ("time_false", "other tracks", "False and second tracks"),
         ("time_gospa", "GOSPA, km", "GOSPA, c = 5 km"),
     )
-    with figure(work, "twenty-five", 3, size=(9.6, 3.7)) as (drawn, axes):
+    with figure(work, "twenty-five-clutter", 3, size=(9.6, 3.7)) as (drawn, axes):
         for ax, (name, label, title) in zip(axes, panels, strict=True):
             scale = 1e-3 if name == "time_gospa" else 1.0
             for reading, result in results.items():
