@@ -59,7 +59,7 @@ bench: $(COMPILED) ## Measure everything; ours beside others where those are ins
 pictures: $(COMPILED) ## Make the pictures that README and docs show; the studies' take minutes
 	@mkdir -p docs/pictures
 	@$(PYTHON) -m radar_console twenty-five --screenshot docs/pictures/twenty-five.png --after 120
-	@set -e; for name in filter-rmse resampling; do \
+	@set -e; for name in filter-rmse resampling seven-targets twenty-five arpa; do \
 	    $(PYTHON) -m radar_console study $$name; cp out/$$name/*.png docs/pictures/; done
 
 # One version of each package for all systems and Pythons, with the hashes of its files. Pins stay

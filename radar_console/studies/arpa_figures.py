@@ -96,7 +96,7 @@ def over_time(work: Work, scores: Sequence["Score"]) -> None:
     """Errors of 95 % of the runs since the confirmation, and the limits."""
     from radar_console.studies.arpa import QUANTITIES
 
-    with figure(work, "arpa-time", 3, rows=2, size=(9.6, 5.6), sharex=True) as (drawn, axes):
+    with figure(work, "arpa-time", 3, rows=2, size=(8.8, 5.0), sharex=True) as (drawn, axes):
         for ax, (what, unit) in zip(axes, QUANTITIES.items(), strict=True):
             for number, (score, colour) in enumerate(zip(scores, _SCENES, strict=False)):
                 ax.plot(TIMES / 60.0, score.within(what), color=colour, label=f"scene {number + 1}")

@@ -80,7 +80,8 @@ def whole(work: Work, picture: Picture, tracks: Sequence[Table], met: Sequence["
         ax.plot(0.0, 0.0, "+", color=INK, ms=9)
         ax.annotate("radar", (0.0, 0.0), (7, -11), textcoords="offset points", path_effects=_HALO)
         ax.set_aspect("equal")
-        ax.set(xlabel="east, km", ylabel="north, km", title="14 · all tracks, centroids (dots) and meetings")
+        ax.set(xlabel="east, km", ylabel="north, km")
+        ax.set_title("14 · the seven tracks, centroids (dots), meetings (rings)")
         far = 1.12 * max(np.abs(picture.truth[name]).max() for name in ("east", "north")) / 1e3
         ax.set(xlim=(-far, far), ylim=(-far, far))
 

@@ -25,7 +25,7 @@ from radar_console.evaluation.intervals import Interval
 from radar_console.studies import scenario_runs
 from radar_console.studies.drawing import BLUE, GREY, RED, figure
 from radar_console.studies.findings import Finding, found
-from radar_console.studies.work import Arrays, Work
+from radar_console.studies.work import Arrays, Work, generator
 
 RUNS = 100
 READINGS = {
@@ -34,6 +34,7 @@ READINGS = {
 }
 _COLOURS = {"twenty-five": BLUE, "twenty-five-dense": RED}
 _TARGETS, _EVERY = 25, 4.0  # s between the instants of the curves
+_TOGETHER = 8  # instants of a mean where there is little to count
 _FIGURES = (
     # name, what, unit
     ("held", "targets held at some time, of 25", ""),
@@ -55,11 +56,15 @@ def run(work: Work) -> list[Finding]:
     """Make all runs; the findings of one reading, then of the other."""
     results = scenario_runs.several(work, "twenty-five", list(READINGS))
     draw(work, results)
-    return [row for name, result in results.items() for row in _findings(name, result)]
+    return [row for name, result in results.items() for row in _findings(name, result, work.seed)]
 
 
-def _findings(name: str, result: Arrays) -> list[Finding]:
-    figures = {metric: intervals.mean(result[metric]) for metric, _, _ in _FIGURES}
+def _findings(name: str, result: Arrays, seed: int) -> list[Finding]:
+    # Resampled, for most of these have a bound at which they crowd.
+    rng = generator(seed, 0)
+    figures = {
+        metric: intervals.bootstrap(intervals.average, result[metric], rng=rng) for metric, _, _ in _FIGURES
+    }
     reading = READINGS[name]
     rows = [
         found(f"{what}, {reading}", unit, figures[metric], _verdict(metric, result))
@@ -103,19 +108,25 @@ def draw(work: Work, results: Mapping[str, Arrays]) -> None:
     """Targets held, false tracks and GOSPA over time, with bands of 95 %."""
     panels = (
         ("time_held", "targets held", "Held"),
-        ("time_false", "other tracks", "False and second tracks"),
+        ("time_false", "other tracks, means of 32 s", "False and second tracks"),
         ("time_gospa", "GOSPA, km", "GOSPA, c = 5 km"),
     )
-    with figure(work, "twenty-five", 3, size=(9.6, 3.7)) as (drawn, axes):
+    with figure(work, "twenty-five-clutter", 3, size=(9.6, 3.7)) as (drawn, axes):
         for ax, (name, label, title) in zip(axes, panels, strict=True):
             scale = 1e-3 if name == "time_gospa" else 1.0
             for reading, result in results.items():
-                values = scale * result[name]
-                time = _EVERY * np.arange(len(values)) / 60.0
+                values, time = _over(scale * result[name], _TOGETHER if name == "time_false" else 1)
                 each = intervals.mean(values)
-                ax.fill_between(time, *_bounds(each), color=_COLOURS[reading], alpha=0.22, lw=0)
+                most = _TARGETS if name == "time_held" else np.inf
+                ax.fill_between(time, *_bounds(each, most), color=_COLOURS[reading], alpha=0.22, lw=0)
                 ax.plot(time, each.value, color=_COLOURS[reading], label=READINGS[reading], lw=1.3)
-            ax.set(xlabel="time, min", ylabel=label, title=title, xlim=(0, time[-1]), ylim=(0, None))
+            ax.set(
+                xlabel="time, min",
+                ylabel=label,
+                title=title,
+                xlim=(0, _EVERY * (len(result[name]) - 1) / 60.0),
+                ylim=(0, None),
+            )
         axes[0].axhline(_TARGETS, color=GREY, lw=1.0, ls=(0, (5, 3)), zorder=1)
         axes[0].set_ylim(0, 26)
         runs = next(iter(results.values()))["held"].shape[-1]
@@ -129,5 +140,12 @@ def draw(work: Work, results: Mapping[str, Arrays]) -> None:
         )
 
 
-def _bounds(each: Interval) -> tuple[np.ndarray, np.ndarray]:
-    return np.maximum(each.low, 0.0), np.asarray(each.high)
+def _over(values: np.ndarray, together: int) -> tuple[np.ndarray, np.ndarray]:
+    """Means of so many instants of a curve (instants, runs), and their times, min."""
+    whole = len(values) // together
+    means = values[: whole * together].reshape(whole, together, -1).mean(axis=1)
+    return means, _EVERY * (together * np.arange(whole) + 0.5 * (together - 1)) / 60.0
+
+
+def _bounds(each: Interval, most: float) -> tuple[np.ndarray, np.ndarray]:
+    return np.maximum(each.low, 0.0), np.minimum(each.high, most)

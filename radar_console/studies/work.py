@@ -8,6 +8,7 @@ only, so one worker finds what ten do.
 
 import hashlib
 import os
+import reprlib
 import sys
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -103,7 +104,7 @@ def _make(task: Mapping[str, Any], _: int) -> Any:
 
 
 def _name(part: Part) -> str:
-    return f"{part.function.__name__}{part.arguments}"
+    return f"{part.function.__name__}{reprlib.repr(part.arguments)}"  # a scenario is long
 
 
 def _digest(part: Part) -> str:

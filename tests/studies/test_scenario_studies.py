@@ -110,7 +110,7 @@ def test_twenty_five_in_small(tmp_path, monkeypatch):
     assert rows[f"targets held at some time, of 25, {thin}"]["ours"] > 23
     assert rows[f"continuity, {thin}"]["ours"] > rows[f"continuity, {dense}"]["ours"]
     assert rows[f"GOSPA, {thin}"]["ours"] < rows[f"GOSPA, {dense}"]["ours"]
-    assert (folder / "twenty-five.png").stat().st_size < 150_000
+    assert (folder / "twenty-five-clutter.png").stat().st_size < 150_000
 
 
 def test_arpa_in_small(tmp_path, monkeypatch):
