@@ -7,8 +7,8 @@ from scenes import FILTERS, Scene, held, of_track, run, sound, swaps, with_value
 from radar_console.core.geometry import slant_range
 
 FEET = 0.3048
-# Both at the same place at the same time (t = 60 s), at an angle of 6°.
-CROSSING = np.array([(-9.6e3, 79.5e3, 160.0, 8.0), (-9.6e3, 80.5e3, 160.0, -8.0)])
+# Both at the same place at the same time (t = 60 s), at an angle of 3.6°.
+CROSSING = np.array([(-9.6e3, 79.68e3, 160.0, 5.0), (-9.6e3, 80.32e3, 160.0, -5.0)])
 ABOVE = [9000.0, 9000.0 + 1000 * FEET]
 
 

@@ -168,7 +168,7 @@ def test_after_its_service_a_track_is_a_turn_away():
             assert track["rho"] - (beam["phi"] - plot["phi"]) >= -math.pi
             waiting += 1
         for track in tracks[np.isin(tracks["id"], rows["track"]) & (tracks["level"] == CONFIRMED)]:
-            gating.look(track, np.zeros(2), beam, world.par)
+            gating.look(track, beam, world.par)
             if 2 * track["half_width"] + world.par["wait"] + world.par["bin"] < TURN:
                 assert -TURN - track["half_width"] < track["rho"] < -math.pi
                 served += 1
