@@ -134,12 +134,10 @@ class Chain:
 
     Attributes
     ----------
-    tracker_threads : how many threads the tracker may use; the same tracks with any number
     clock : what the tracker's time is taken with, s
     """
 
     opened: Opened
-    tracker_threads: int | None = None
     clock: Callable[[], float] = time.perf_counter
     tally: Tally = field(default_factory=Tally)
     gauge: Gauge = field(default_factory=Gauge)
@@ -151,7 +149,7 @@ class Chain:
 
         opened, settings = self.opened, self.opened.settings
         self.clustering = Clustering(settings.plots, settings.radar)
-        self.tracker = Tracker(settings.tracker, opened.source.radar, opened.seed, self.tracker_threads)
+        self.tracker = Tracker(settings.tracker, opened.source.radar, opened.seed)
 
     def run(
         self, threads: bool = False, pace: Pace | None = None, policy: Policy = Policy.BLOCK

@@ -37,7 +37,7 @@ class ScenarioRun:
 
     def __call__(self, setting: Setting, seed: int) -> dict[str, float]:
         """The figures, by the names of `RUN_METRICS`; the same seed gives the same, but for times."""
-        chain = Chain(self.opened(setting, seed), tracker_threads=1, clock=time.thread_time)
+        chain = Chain(self.opened(setting, seed), clock=time.thread_time)
         tracks, truth = follow(chain), truth_of(chain.opened, self.scoring.interval)
         took = 1e3 * chain.tally.tracker_s.quantile(0.5)
         return score(truth, tracks, self.scoring) | {"tracker_ms_per_turn": took}

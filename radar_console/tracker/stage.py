@@ -5,7 +5,6 @@ tracks, not in one bit: a bin is processed once the watermark `Sector.complete` 
 """
 
 import math
-import os
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
@@ -59,7 +58,6 @@ _MODELS = ("cv", "ca", "ct", "singer")
 
 _INITIATIONS = ("auto", "m-of-n", "score", "branching")
 
-_MOST_THREADS = 4
 _MANY_TRACKS = 100  # from which on threads are worth their trouble
 _LEAST_SHARE = 4  # members for each thread
 _CLIMB_NOISE = 1.0  # m²/s³, of the rate of climb
@@ -98,13 +96,11 @@ class Tracker:
     ----------
     settings, radar : the scenario's [tracker], and the sensor
     seed : of all random numbers
-    threads : at work when there are many tracks; without it as many as there are processors. Their
-        number has no influence on the tracks.
+    threads : at work on the particles when there are many tracks; their number has no influence on the
+        tracks. One is fastest as far as was measured, see docs/performance.md.
     """
 
-    def __init__(
-        self, settings: TrackerSettings, radar: Radar, seed: int, threads: int | None = None
-    ) -> None:
+    def __init__(self, settings: TrackerSettings, radar: Radar, seed: int, threads: int = 1) -> None:
         self.settings, self.radar, self._counts = settings, radar, Counts()
         self._above_sea = radar.site.height if radar.site else 0.0
         self._world = _empty_world(settings, radar, seed)
@@ -112,7 +108,7 @@ class Tracker:
         self._log = _BeamLog()
         self._next_bin: int | None = None
         self._last: Sector | None = None
-        self._threads = min(os.cpu_count() or 1, _MOST_THREADS) if threads is None else threads
+        self._threads = threads
         self._many_tracks = _MANY_TRACKS
         self._pool: ThreadPoolExecutor | None = None
 
