@@ -53,7 +53,7 @@ def own_velocity(radar: RadarSettings) -> Array:
 
 def _one_tracked(run: ScenarioRun, filter_name: str, seed: int) -> Arrays:
     opened = run.opened({"tracker.filter": filter_name}, seed)
-    rows = follow(Chain(opened, tracker_threads=1))
+    rows = follow(Chain(opened))
     assert opened.truth is not None
     own = own_velocity(opened.settings.radar)
     estimate, truth = np.full((2, len(TIMES), 4), np.nan)

@@ -84,7 +84,7 @@ def scored(run: ScenarioRun, runs: range, seed: int) -> Arrays:
 
 def pictured(run: ScenarioRun, seed: int) -> dict[str, Any]:
     """Truth, tracks and centroids of a run."""
-    chain = Chain(run.opened({}, seed), tracker_threads=1)
+    chain = Chain(run.opened({}, seed))
     tracks, seen = [np.empty(0, TRACK)], [np.empty((0, 2))]
     for sector in chain.run():
         tracks.append(sector.tracks)
@@ -95,7 +95,7 @@ def pictured(run: ScenarioRun, seed: int) -> dict[str, Any]:
 
 
 def _one_scored(run: ScenarioRun, seed: int) -> Arrays:
-    chain = Chain(run.opened({}, seed), tracker_threads=1)
+    chain = Chain(run.opened({}, seed))
     tracks = follow(chain)
     truth, how = truth_of(chain.opened, run.scoring.interval), run.scoring
     figures = score(truth, tracks, how)
