@@ -16,12 +16,12 @@ longer than the crossing. Of each run:
 - extra: a third track was confirmed. Only counted where initiation is at work, in runs of their own with the
   same plots; elsewhere there is room for the two tracks given, so that nothing disturbs swap and loss.
 
-Initiation in 6.7 per km² is slow: a twentieth of the runs. Beside: the Kalman filter; GNN with a gate of 0.99
+Initiation in 6.7 per km² is slow: a quarter of the runs. Beside: the Kalman filter; GNN with a gate of 0.99
 in place of 0.9999; process noise for straight courses (1 in place of 30 m²/s³). What is due to the crossing
 is seen beside the same courses moved aside, 15 km apart at the least, and meeting at 0 m. Intervals are
 Wilson's, those of differences Newcombe's for the same runs.
 
-Running time: 200 runs take some 20 minutes on one core.
+Running time: 200 runs take some 25 minutes on one core.
 """
 
 from typing import NamedTuple
@@ -51,7 +51,7 @@ EVENTS = {
 _CHUNK, _CHUNK_STARTED, _CHUNK_DENSE = 20, 5, 1  # runs of a part
 _MAIN = ("GNN", "JPDA")
 _BESIDE = ("GNN, Kalman", "JPDA, Kalman", "GNN, gate 0.99", "GNN, straight", "JPDA, straight")
-_DENSE_SHARE = 20
+_DENSE_SHARE = 4
 _PUBLISHED = {("kept", "GNN"): 0.0, ("kept", "JPDA"): 1.0, ("extra", "GNN"): 1.0, ("extra", "JPDA"): 0.0}
 
 

@@ -58,5 +58,5 @@ def test_every_study_of_the_catalogue_can_be_loaded_and_says_what_it_is():
 def test_an_unknown_study_is_named_with_a_suggestion():
     with pytest.raises(RadarConsoleError, match="did you mean filter-rmse"):
         catalogue.load("filter-rsme")
-    with pytest.raises(RadarConsoleError, match="expected one of filter-rmse, resampling"):
+    with pytest.raises(RadarConsoleError, match="expected one of seven-targets, "):
         catalogue.load("xyz")
