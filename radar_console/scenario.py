@@ -10,7 +10,15 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, Literal, Self, TypeVar, get_args
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
+from pydantic import (
+    BaseModel,
+    BeforeValidator,
+    ConfigDict,
+    Field,
+    ValidationError,
+    WithJsonSchema,
+    model_validator,
+)
 from pydantic_core import ErrorDetails, PydanticCustomError
 
 from radar_console.core.errors import InputError, ScenarioError
@@ -23,6 +31,20 @@ Finite = Annotated[float, Field(allow_inf_nan=False)]
 Probability = Annotated[float, Field(ge=0, le=1)]
 Bearing = Annotated[float, Field(ge=0, lt=360)]
 Count = Annotated[int, Field(ge=1)]
+
+SHORT = {"pf": "particle", "kf": "kalman", "ekf": "extended", "ukf": "unscented"}
+"""What the field calls the filters for short."""
+
+
+def _spelt_out(name: Any) -> Any:
+    return SHORT.get(name, name) if isinstance(name, str) else name
+
+
+FilterName = Annotated[
+    Literal["particle", "kalman", "extended", "unscented", "imm"],
+    BeforeValidator(_spelt_out),
+    WithJsonSchema({"type": "string", "enum": [*SHORT.values(), "imm", *SHORT]}),
+]
 
 
 class Settings(BaseModel):
@@ -276,7 +298,7 @@ class PlotSettings(Settings):
 class TrackerSettings(Settings):
     """Association, filter, initiation and deletion."""
 
-    filter: Literal["particle", "kalman", "extended", "unscented", "imm"] = "particle"
+    filter: FilterName = "particle"
     models: Annotated[
         tuple[Literal["cv", "ca", "ct", "singer"], ...],
         Field(

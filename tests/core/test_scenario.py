@@ -37,6 +37,14 @@ def problems(folder: Path, text: str) -> dict[str, str]:
     return dict(caught.value.problems)
 
 
+@pytest.mark.parametrize(("short", "name"), scenario.SHORT.items())
+def test_filters_have_short_names(tmp_path: Path, short: str, name: str) -> None:
+    text = GOOD + f'[tracker]\nfilter = "{short}"\n'
+    assert scenario.load(write(tmp_path, text)).tracker.filter == name
+    known = json.loads(scenario.json_schema())["$defs"]["TrackerSettings"]["properties"]["filter"]["enum"]
+    assert {short, name} <= set(known)
+
+
 def test_a_good_file(tmp_path: Path) -> None:
     loaded = scenario.load(write(tmp_path, GOOD))
     assert loaded.target[0].speed == pytest.approx(300 * KT)
