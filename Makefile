@@ -56,11 +56,13 @@ bench: $(COMPILED) ## Measure everything; ours beside others where those are ins
 	echo "== benchmarks/acceptance.py scenario twenty-five"; \
 	$(PYTHON) -m benchmarks.acceptance scenario twenty-five
 
-pictures: $(COMPILED) ## Make the pictures that README and docs show; the studies' take minutes
+pictures: $(COMPILED) ## Make the pictures that README and docs show; the studies' take an hour
 	@mkdir -p docs/pictures
 	@$(PYTHON) -m radar_console twenty-five --screenshot docs/pictures/twenty-five.png --after 120
-	@set -e; for name in filter-rmse resampling seven-targets twenty-five arpa; do \
-	    $(PYTHON) -m radar_console study $$name; cp out/$$name/*.png docs/pictures/; done
+	@set -e; for name in $$($(PYTHON) -m radar_console study --list | cut -d ' ' -f 1); do \
+	    $(PYTHON) -m radar_console study $$name; done
+	@for file in out/*/*.png; do \
+	    if [ -e docs/pictures/$${file##*/} ]; then cp $$file docs/pictures/; fi; done
 
 # One version of each package for all systems and Pythons, with the hashes of its files. Pins stay
 # as they are unless they must move: UPGRADE=--upgrade moves all, UPGRADE="-P numpy" one.
