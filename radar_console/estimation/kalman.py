@@ -50,56 +50,68 @@ def predict_in_place(x: Array, P: Array, T: float, q: float) -> None:
         P[v, v] += q * T
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
-def update_in_place(x: Array, P: Array, z: Array, R: Array, lag: Array, beta: Array) -> None:
-    """Condition one track on alternative position measurements: the PDA update.
+MIXTURE = (9, 4)
+"""Shape of the room in which the alternatives of an update are added up; zero before the first."""
 
-    Each alternative is a Kalman update of its own, at its own time and with its own noise; the
-    mixture of them and of the prediction is matched by its first two moments.
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def add_alternative(
+    x: Array, P: Array, e: float, n: float, ee: float, en: float, nn: float, lag: float, beta: float, A: Array
+) -> None:
+    """Add to `A` what a position of probability `beta` makes of one track, x (4,) and P (4, 4).
+
+    Each alternative is a Kalman update of its own, at its own time and with its own noise. It moves the
+    mean by P w, where w = Hᵀ S⁻¹ ν, and takes P Hᵀ S⁻¹ H P from the covariance. So the mixture of all, and
+    of the prediction with what is left to 1, has the mean x + P w̄ and the covariance P - P M P, with
+    M = Σ β (Hᵀ S⁻¹ H - w wᵀ) + w̄ w̄ᵀ. `A` holds w̄ and the sum in M; `mix_in_place` finishes.
 
     Parameters
     ----------
-    x, P : (4,) and (4, 4), predicted; changed in place
-    z, R : (m, 2) measured positions; (m, 3) their covariances ee, en, nn
-    lag : (m,) time of the measurement less the time of x, s
-    beta : (m,) probabilities; what is left to 1 belongs to the prediction
+    e, n : measured position; ee, en, nn its covariance
+    lag : s, its time less that of x
+    A : MIXTURE
 
     Source: Bar-Shalom, Willett, Tian, Tracking and Data Fusion, 2011, (3.4.2-9) generalised to
     measurements of different noise.
     """
-    m = beta.size
-    gain, shift, mean = np.empty((4, 2)), np.empty((m, 4)), np.zeros(4)
-    reduction, prior = np.zeros((4, 4)), P
-    for j in range(m):
-        t = lag[j]
-        # P Hᵀ, with H = [I, t I]
-        for i in range(4):
-            gain[i, 0] = prior[i, 0] + t * prior[i, 2]
-            gain[i, 1] = prior[i, 1] + t * prior[i, 3]
-        s_ee = gain[0, 0] + t * gain[2, 0] + R[j, 0]
-        s_en = gain[0, 1] + t * gain[2, 1] + R[j, 1]
-        s_nn = gain[1, 1] + t * gain[3, 1] + R[j, 2]
-        det = s_ee * s_nn - s_en * s_en
-        nu_e = z[j, 0] - x[0] - t * x[2]
-        nu_n = z[j, 1] - x[1] - t * x[3]
-        u_e = (s_nn * nu_e - s_en * nu_n) / det
-        u_n = (s_ee * nu_n - s_en * nu_e) / det
-        for i in range(4):
-            shift[j, i] = gain[i, 0] * u_e + gain[i, 1] * u_n
-            mean[i] += beta[j] * shift[j, i]
-            k_e = (gain[i, 0] * s_nn - gain[i, 1] * s_en) / det
-            k_n = (gain[i, 1] * s_ee - gain[i, 0] * s_en) / det
-            for k in range(i + 1):
-                reduction[i, k] += beta[j] * (k_e * gain[k, 0] + k_n * gain[k, 1])
+    t = lag
+    s_ee = P[0, 0] + 2.0 * t * P[0, 2] + t * t * P[2, 2] + ee
+    s_en = P[0, 1] + t * (P[0, 3] + P[1, 2]) + t * t * P[2, 3] + en
+    s_nn = P[1, 1] + 2.0 * t * P[1, 3] + t * t * P[3, 3] + nn
+    det = s_ee * s_nn - s_en * s_en
+    nu_e, nu_n = e - x[0] - t * x[2], n - x[1] - t * x[3]
+    u_e, u_n = (s_nn * nu_e - s_en * nu_n) / det, (s_ee * nu_n - s_en * nu_e) / det
+    m_ee, m_en, m_nn = s_nn / det - u_e * u_e, -s_en / det - u_e * u_n, s_ee / det - u_n * u_n
+    for i in range(2):  # position and velocity
+        b = beta * t if i else beta
+        A[0, 2 * i] += b * u_e
+        A[0, 2 * i + 1] += b * u_n
+        for k in range(2):
+            c = b * t if k else b
+            A[1 + 2 * i, 2 * k] += c * m_ee
+            A[1 + 2 * i, 2 * k + 1] += c * m_en
+            A[2 + 2 * i, 2 * k] += c * m_en
+            A[2 + 2 * i, 2 * k + 1] += c * m_nn
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def mix_in_place(x: Array, P: Array, A: Array) -> None:
+    """Make one track, x (4,) and P (4, 4), the mixture that was added up in `A`."""
+    w, M, G = A[0], A[1:5], A[5:9]
+    for i in range(4):
+        for k in range(4):
+            M[i, k] += w[i] * w[k]
+    for i in range(4):  # P M
+        for k in range(4):
+            G[i, k] = P[i, 0] * M[0, k] + P[i, 1] * M[1, k] + P[i, 2] * M[2, k] + P[i, 3] * M[3, k]
+    for i in range(4):
+        x[i] += P[i, 0] * w[0] + P[i, 1] * w[1] + P[i, 2] * w[2] + P[i, 3] * w[3]
+        for k in range(i + 1):
+            M[i, k] = G[i, 0] * P[0, k] + G[i, 1] * P[1, k] + G[i, 2] * P[2, k] + G[i, 3] * P[3, k]
     for i in range(4):
         for k in range(i + 1):
-            spread = -mean[i] * mean[k]
-            for j in range(m):
-                spread += beta[j] * shift[j, i] * shift[j, k]
-            P[i, k] += spread - reduction[i, k]
+            P[i, k] -= M[i, k]
             P[k, i] = P[i, k]
-    for i in range(4):
-        x[i] += mean[i]
 
 
 @njit(cache=True, nogil=True, error_model="numpy")

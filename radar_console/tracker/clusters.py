@@ -9,10 +9,10 @@ import math
 from typing import Any
 
 import numpy as np
-from numba import njit
 
 from radar_console.tracker import clutter, filters, gating, height, identity, management
 from radar_console.tracker.association import choose, jpda
+from radar_console.tracker.kernels import bare, inlined, owning
 from radar_console.tracker.records import (
     C_APPROXIMATE,
     C_FORCED,
@@ -29,6 +29,7 @@ from radar_console.tracker.records import (
 )
 
 _find, _solve, _BUDGET = jpda.find, choose.associate, jpda.BUDGET
+_PDA, _JPDA = choose.PDA, choose.JPDA
 _advance, _log_likelihood, _update = filters.advance, filters.log_likelihood, filters.update
 _density_at, _MARGIN = clutter.density_at, gating.MARGIN
 _height_factor, _update_height, _identity_factor = height.factor, height.update, identity.factor
@@ -37,18 +38,21 @@ _serve = management.serve
 _PRUNE = 1e-3  # of the miss: a pair that is less likely is no pair
 
 
-@njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
+@inlined
 def group(beam: Any, w: World, final: bool) -> None:
     """Find the clusters that are due, and list their members and pairs."""
+    w.books.size[N_MEMBERS] = w.books.size[N_PAIRS] = 0
+    for place in range(w.books.size[N_OPEN]):
+        track = w.tracks[w.opened[place]]
+        if track.level == CONFIRMED and track.swept:
+            _group(beam, w, final)
+            return
+
+
+@owning
+def _group(beam: Any, w: World, final: bool) -> None:
     size, tracks, pool, edges = w.books.size, w.tracks, w.pool, w.edges
     n = size[N_OPEN]
-    size[N_MEMBERS] = size[N_PAIRS] = 0
-    any_swept = False
-    for place in range(n):
-        track = tracks[w.opened[place]]
-        any_swept |= track.level == CONFIRMED and track.swept
-    if not any_swept:
-        return
     for p in range(size[N_POOL]):
         pool[p].mark = -1
     parent = np.arange(n)
@@ -96,7 +100,7 @@ def group(beam: Any, w: World, final: bool) -> None:
     size[N_MEMBERS], size[N_PAIRS] = m, pairs
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@bare
 def weigh(w: World, lo: int, hi: int) -> None:
     """Predict the members from `lo` to `hi` to their plots, and weigh these."""
     tracks, pool, edges, par = w.tracks, w.pool, w.edges, w.par
@@ -122,7 +126,7 @@ def weigh(w: World, lo: int, hi: int) -> None:
             k = edges[k].next
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@bare
 def _mean_time(track: Any, pool: Any, edges: Any) -> float:
     """Mean time of the plots in the gate, weighted by their likelihoods."""
     total, t, k = 0.0, 0.0, track.first
@@ -135,7 +139,7 @@ def _mean_time(track: Any, pool: Any, edges: Any) -> float:
     return mean
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@bare
 def evidence(track: Any, plot: Any, par: Any) -> float:
     """What a plot says besides its position: likelihood ratio of its height and its identity."""
     ratio = 1.0
@@ -146,7 +150,7 @@ def evidence(track: Any, plot: Any, par: Any) -> float:
     return ratio
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@bare
 def associate(w: World) -> None:
     """Find the probability of every pair, cluster by cluster, and use the plots up."""
     lo, stop = NIL, w.books.size[N_MEMBERS]
@@ -154,11 +158,58 @@ def associate(w: World) -> None:
         hi = lo + 1
         while hi < stop and w.members[hi].cluster == w.members[lo].cluster:
             hi += 1
-        _associate(lo, hi, w)
+        if hi == lo + 1 and (w.par.associator == _PDA or w.par.associator == _JPDA):
+            _associate_alone(lo, w)
+        else:
+            _associate(lo, hi, w)
         lo = hi
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@bare
+def _associate_alone(m: int, w: World) -> None:
+    """The same for one track that shares no plots: probabilistic data association."""
+    size, pool, par, member = w.books.size, w.pool, w.par, w.members[m]
+    track, begin, end = w.tracks[member.track], member.pairs, size[N_PAIRS]
+    if m + 1 < size[N_MEMBERS]:
+        end = w.members[m + 1].pairs
+    miss = 1.0 - par.p_d * par.p_g
+    total = miss
+    for k in range(begin, end):
+        pair = w.pairs[k]
+        pair.w *= _relative_to_clutter(track, pool[pair.plot], par)
+        if pair.w > _PRUNE * miss:
+            total += pair.w
+            _keep_pair(k, member, w)
+    for k in range(begin, begin + member.kept):
+        pair = w.pairs[k]
+        plot = pool[pair.plot]
+        pair.beta = min(pair.w / total, plot.weight)
+        member.used += pair.beta
+        if track.swept:
+            plot.weight = max(plot.weight - pair.beta, 0.0)
+    if track.swept:
+        track.score += math.log(total)
+
+
+@bare
+def _relative_to_clutter(track: Any, plot: Any, par: Any) -> float:
+    """What a pair's likelihood is to be multiplied by, to be relative to the plot's being false."""
+    density = _density_at(plot, track.near, track.exposure, par)
+    ratio: float = par.p_d / density * plot.weight * evidence(track, plot, par)
+    return ratio
+
+
+@owning
+def _keep_pair(k: int, member: Any, w: World) -> None:
+    """Those that stay stand together."""
+    place = member.pairs + member.kept
+    if place != k:
+        w.relative[place] = w.relative[k]
+        w.pairs[place] = w.pairs[k]
+    member.kept += 1
+
+
+@owning
 def _associate(lo: int, hi: int, w: World) -> None:
     tracks, pool, par = w.tracks, w.pool, w.par
     begin = w.members[lo].pairs
@@ -177,12 +228,7 @@ def _associate(lo: int, hi: int, w: World) -> None:
         for k in range(member.pairs, until):
             pair = w.pairs[k]
             plot = pool[pair.plot]
-            pair.w *= (
-                par.p_d
-                / _density_at(plot, track.near, track.exposure, par)
-                * plot.weight
-                * evidence(track, plot, par)
-            )
+            pair.w *= _relative_to_clutter(track, plot, par)
             if pair.w > _PRUNE * miss[i]:
                 if plot.mark < 0:
                     plot.mark = plots
@@ -195,15 +241,11 @@ def _associate(lo: int, hi: int, w: World) -> None:
     total = miss
     for k in range(n):
         i = row[k]
-        member, pair = w.members[lo + i], w.pairs[kept[k]]
+        member = w.members[lo + i]
         total[i] += weight[k]
-        place = member.pairs + member.kept
-        if place != kept[k]:  # those that stay stand together
-            w.relative[place] = w.relative[kept[k]]
-            w.pairs[place] = pair
-            pair = w.pairs[place]
+        pair = w.pairs[member.pairs + member.kept]
+        _keep_pair(kept[k], member, w)
         pair.beta = beta[k]
-        member.kept += 1
         member.used += beta[k]
         if tracks[member.track].swept:
             pool[pair.plot].weight = max(pool[pair.plot].weight - beta[k], 0.0)
@@ -216,7 +258,7 @@ def _associate(lo: int, hi: int, w: World) -> None:
                 w.books.tally[C_APPROXIMATE] += 1
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@owning
 def _cap(col: Any, plots: int, kept: Any, w: World, beta: Any) -> None:
     """No plot is used for more than what is left of it."""
     used = np.zeros(plots)
@@ -228,7 +270,7 @@ def _cap(col: Any, plots: int, kept: Any, w: World, beta: Any) -> None:
             beta[k] *= left / used[col[k]]
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@owning
 def step(w: World, lo: int, hi: int) -> None:
     """Update the swept members from `lo` to `hi`."""
     for m in range(lo, hi):
@@ -245,7 +287,7 @@ def step(w: World, lo: int, hi: int) -> None:
         _update_height(track, w.pool, chosen, beta, w.par.up_q)
 
 
-@njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
+@inlined
 def serve_members(beam: Any, w: World) -> None:
     """Account for the pass of every swept member."""
     for m in range(w.books.size[N_MEMBERS]):

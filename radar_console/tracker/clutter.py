@@ -12,8 +12,8 @@ import math
 from typing import Any
 
 import numpy as np
-from numba import njit
 
+from radar_console.tracker.kernels import bare, inlined
 from radar_console.tracker.records import N_PAST, World
 
 RINGS, COLUMNS = 32, 64
@@ -39,7 +39,7 @@ def empty_map() -> Any:
     return np.zeros(1, MAP)
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@bare
 def place(e: float, n: float, max_range: float) -> tuple[int, int]:
     """Ring and column of a position relative to the sensor."""
     ring = min(int(math.hypot(e, n) / max_range * RINGS), RINGS - 1)
@@ -47,7 +47,7 @@ def place(e: float, n: float, max_range: float) -> tuple[int, int]:
     return ring, column
 
 
-@njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
+@inlined
 def turn_to(clutter: Any, phi: float) -> None:
     """Forget a part of each column that the beam enters on its way to the unwrapped angle `phi`."""
     now = math.floor(phi / (2.0 * math.pi) * COLUMNS)
@@ -62,7 +62,7 @@ def turn_to(clutter: Any, phi: float) -> None:
             clutter.area[ring, column] *= MEMORY
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@bare
 def survey(plot: Any, beam: Any, w: World) -> None:
     """Count what the beam met around a plot just before it; and keep the plot for those to come."""
     par, past, size, clutter = w.par, w.past, w.books.size, w.clutter
@@ -96,7 +96,7 @@ def survey(plot: Any, beam: Any, w: World) -> None:
         size[N_PAST] += 1
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@bare
 def _first_from(past: Any, stop: int, phi: float) -> int:
     """The first of the past centroids, in the order of their angles, that is not below `phi`."""
     lo, hi = 0, stop
@@ -109,7 +109,7 @@ def _first_from(past: Any, stop: int, phi: float) -> int:
     return lo
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@bare
 def density_at(plot: Any, near: float, exposure: float, par: Any) -> float:
     """λ, m⁻² and turn, at a plot, for a track that met `near` others in `exposure` m² and turns."""
     if not math.isnan(par.clutter):
@@ -118,7 +118,7 @@ def density_at(plot: Any, near: float, exposure: float, par: Any) -> float:
     return density
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@bare
 def doubted(track: Any, plot: Any, par: Any) -> float:
     """λ, m⁻² and turn, for a track that has yet to prove itself: no less than the mean of the cell.
 
@@ -128,14 +128,14 @@ def doubted(track: Any, plot: Any, par: Any) -> float:
     return max(density_at(plot, track.near, track.exposure, par), float(plot.base))
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@bare
 def gather(track: Any, plot: Any) -> None:
     """Add what lay around a track's plot to what the track has met."""
     track.near = TRACK_MEMORY * (track.near + plot.near)
     track.exposure = TRACK_MEMORY * (track.exposure + plot.exposure)
 
 
-@njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
+@inlined
 def forget(phi: float, w: World) -> None:
     """Drop what the counts need no more, once it is the better part of what is kept."""
     drop, size = _first_from(w.past, w.books.size[N_PAST], phi - math.pi), w.books.size

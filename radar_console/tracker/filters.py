@@ -6,11 +6,11 @@ weighs a plot, and `update` conditions on plots with their association probabili
 
 from typing import Any
 
-from numba import njit
 
 from radar_console.estimation.gaussian import Array
 from radar_console.estimation.particle import Singles
 from radar_console.tracker import bank, cloud
+from radar_console.tracker.kernels import owning
 from radar_console.tracker.records import PARTICLE, Belief
 
 _start_cloud, _advance_cloud, _weigh_cloud, _update_cloud = (
@@ -27,7 +27,7 @@ _start_bank, _advance_bank, _weigh_bank, _update_bank = (
 )
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@owning
 def start(track: Any, sensor_e: float, sensor_n: float, par: Any, belief: Belief) -> None:
     """Begin from the track's Gaussian; `track.slot` is its row of `belief`."""
     if par.filter == PARTICLE:
@@ -36,7 +36,7 @@ def start(track: Any, sensor_e: float, sensor_n: float, par: Any, belief: Belief
         _start_bank(track, sensor_e, sensor_n, par, belief)
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@owning
 def advance(track: Any, t: float, par: Any, belief: Belief) -> None:
     """Predict to the time `t`; sets the track's time and moments."""
     if par.filter == PARTICLE:
@@ -45,7 +45,7 @@ def advance(track: Any, t: float, par: Any, belief: Belief) -> None:
         _advance_bank(track, t, par, belief)
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@owning
 def log_likelihood(track: Any, plot: Any, par: Any, belief: Belief, relative: Singles) -> tuple[float, float]:
     """log ĝ of a plot, and Σ w `relative`; `relative` (N,) is for `update`."""
     if par.filter == PARTICLE:
@@ -53,7 +53,7 @@ def log_likelihood(track: Any, plot: Any, par: Any, belief: Belief, relative: Si
     return _weigh_bank(track, plot, par, belief, relative)
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@owning
 def update(
     track: Any,
     miss: float,

@@ -3,8 +3,8 @@
 import math
 from typing import Any
 
-from numba import njit
 
+from radar_console.tracker.kernels import bare
 from radar_console.tracker.records import CONFIRMED, STARTER
 
 MARGIN = math.radians(0.05)
@@ -19,13 +19,13 @@ def threshold(probability: float) -> float:
     return -2.0 * math.log1p(-probability)
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@bare
 def wrap(angle: float) -> float:
     """The same angle in (-π, π]."""
     return angle - _TURN * math.ceil(angle / _TURN - 0.5)
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@bare
 def predicted(track: Any, T: float) -> tuple[float, float, float, float, float]:
     """The forecast: position `T` s after the track's time, and its covariance ee, en, nn.
 
@@ -45,7 +45,7 @@ def predicted(track: Any, T: float) -> tuple[float, float, float, float, float]:
     )
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@bare
 def extent(
     de: float, dn: float, ee: float, en: float, nn: float, sd_range: float, sd_azimuth: float, gamma: float
 ) -> tuple[float, float]:
@@ -71,14 +71,14 @@ def extent(
     return width, along + 0.5 * ww / (r - along)
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@bare
 def limit(track: Any, par: Any) -> float:
     """γ of the track's gate; less for a young one in dense clutter, where every plot makes a branch."""
     gate: float = par.gate
     return min(gate, _DENSE_LIMIT) if track.dense and track.level != CONFIRMED else gate
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@bare
 def look(track: Any, beam: Any, par: Any) -> tuple[float, float]:
     """Set the track's beam phase and its gate's extent; until which beam angle and time it can sleep."""
     T = max(beam.t - track.t, 0.0)
@@ -101,13 +101,15 @@ def look(track: Any, beam: Any, par: Any) -> tuple[float, float]:
     # Until the beam is there the target moves on, and its gate grows, by `speed` at the most. Twice the
     # angle of that, over the time that the beam should take, is left to it; if it takes longer, the
     # track wakes by time. Of the way ahead at least half goes by in sleep.
-    x, P = track.x, track.P
-    speed = math.sqrt(x[2] * x[2] + x[3] * x[3]) + 10.0 * math.sqrt(P[2, 2] + P[3, 3]) + par.max_speed
+    # A starter stands still, and its reach grows by the largest speed; a radar that moves may do the same.
+    x, P, speed = track.x, track.P, 2.0 * par.max_speed
+    if track.level != STARTER or h > 1.0:
+        speed = math.sqrt(x[2] * x[2] + x[3] * x[3]) + 10.0 * math.sqrt(P[2, 2] + P[3, 3]) + par.max_speed
     sleep = min(1.25 * par.turn * ahead / _TURN, min(0.25 * ahead, 0.5) * r / speed)
     return beam.phi + ahead - 2.0 * speed * sleep / r, beam.t + sleep
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@bare
 def drift(track: Any, lag: float) -> float:
     """How far the track's gate can move in `lag` s, m."""
     x, P = track.x, track.P
@@ -115,7 +117,7 @@ def drift(track: Any, lag: float) -> float:
     return lag * speed
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@bare
 def start_reach(track: Any, T: float, noise: float, par: Any) -> float:
     """How far from its first plot a starter's second can be after `T` s; `noise` is its variance."""
     P = track.P
@@ -123,7 +125,7 @@ def start_reach(track: Any, T: float, noise: float, par: Any) -> float:
     return reach
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@bare
 def too_fast(track: Any, par: Any) -> bool:
     """The track is surely faster than targets are."""
     x, P = track.x, track.P
@@ -131,14 +133,14 @@ def too_fast(track: Any, par: Any) -> bool:
     return bool(math.hypot(x[2], x[3]) > par.max_speed + slack)
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@bare
 def innovation(track: Any, T: float, plot: Any, scale: float) -> tuple[float, float, float, float, float]:
     """Innovation de, dn of a plot `T` s after the track's time, and S; the plot's noise times `scale`."""
     e, n, ee, en, nn = predicted(track, T)
     return plot.e - e, plot.n - n, ee + scale * plot.ee, en + scale * plot.en, nn + scale * plot.nn
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@bare
 def density_of(track: Any, T: float, plot: Any, scale: float) -> float:
     """N(z; ẑ, S), m⁻², of a plot `T` s after the track's time, its covariance times `scale`."""
     de, dn, ee, en, nn = innovation(track, T, plot, scale)
@@ -147,7 +149,7 @@ def density_of(track: Any, T: float, plot: Any, scale: float) -> float:
     return math.exp(-0.5 * d2) / (_TURN * math.sqrt(det))
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@bare
 def density(track: Any, plot: Any, par: Any) -> float:
     """Gaussian likelihood of the plot, m⁻², predicted to its own time; 0 outside the gate."""
     T = max(plot.t - track.t, 0.0)

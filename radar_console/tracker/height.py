@@ -8,16 +8,16 @@ import math
 from typing import Any
 
 import numpy as np
-from numba import njit
 
 from radar_console.estimation.gaussian import Array
+from radar_console.tracker.kernels import bare
 
 _SD_CLIMB = 15.0  # m/s, before anything is known
 _SPAN = 12_000.0  # m, over which other heights are spread
 _ODD = 0.05  # part of the heights that say nothing
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@bare
 def begin(track: Any, plot: Any) -> None:
     """The height of the first plot that has one."""
     up, P = track.up, track.up_P
@@ -26,7 +26,7 @@ def begin(track: Any, plot: Any) -> None:
     track.up_t = plot.t
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@bare
 def predicted(track: Any, t: float, q: float) -> tuple[float, float, float, float, float]:
     """Height and rate at the time `t`, and their covariance pp, pv, vv."""
     up, P = track.up, track.up_P
@@ -40,7 +40,7 @@ def predicted(track: Any, t: float, q: float) -> tuple[float, float, float, floa
     )
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@bare
 def factor(track: Any, plot: Any, q: float) -> float:
     """Likelihood of the plot's height, relative to that of any other target's; 1 where one is unknown."""
     if not (math.isfinite(track.up[0]) and math.isfinite(plot.up)):
@@ -51,7 +51,7 @@ def factor(track: Any, plot: Any, q: float) -> float:
     return (1.0 - _ODD) * _SPAN * math.exp(-0.5 * nu * nu / S) / math.sqrt(2.0 * math.pi * S) + _ODD
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@bare
 def update(track: Any, pool: Any, chosen: Any, beta: Array, q: float) -> None:
     """Condition on the plots `chosen` (m,) of `pool`, with probabilities `beta` (m,): the PDA update."""
     likeliest = -1

@@ -7,7 +7,8 @@ ever certain, and a track whose only plot has a foreign code still takes it.
 
 from typing import Any
 
-from numba import njit
+from radar_console.tracker.kernels import bare
+
 
 # Likelihood ratios: the report is of this target, against any other's.
 SAME_ADDRESS, OTHER_ADDRESS = 1e3, 1e-3
@@ -15,7 +16,7 @@ SAME_CODE, OTHER_CODE = 50.0, 0.02
 _SURE = 5  # agreements beyond which a track's identity gains no more weight
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@bare
 def factor(track: Any, plot: Any) -> float:
     """How much likelier the plot's identity makes it the track's; 1 where one is unknown."""
     if track.address >= 0 and plot.address >= 0:
@@ -25,7 +26,7 @@ def factor(track: Any, plot: Any) -> float:
     return 1.0
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@bare
 def learn(track: Any, plot: Any) -> None:
     """Take over the identity of a hit: a majority of recent codes, so that a garbled one passes by."""
     if plot.address >= 0:

@@ -4,11 +4,11 @@ import math
 from typing import Any
 
 import numpy as np
-from numba import njit
 
 from radar_console.core.messages import TrackStatus
 from radar_console.estimation.gaussian import Array
-from radar_console.tracker import clutter, filters, gating, height, identity, order
+from radar_console.tracker import clutter, filters, gating, height, identity
+from radar_console.tracker.kernels import bare, inlined, owning
 from radar_console.tracker.records import (
     AUTO,
     BRANCHING,
@@ -36,7 +36,7 @@ from radar_console.tracker.records import (
 )
 
 _wrap, _too_fast, _start_belief, _predicted = gating.wrap, gating.too_fast, filters.start, gating.predicted
-_gather, _ascending = clutter.gather, order.ascending
+_gather = clutter.gather
 _height, _begin_height, _learn = height.predicted, height.begin, identity.learn
 _TURN = 2.0 * math.pi
 FIRST_SCORE = math.log(0.1 / 0.9)  # one plot in ten is a new target's
@@ -52,7 +52,7 @@ _COASTING = variable(TrackStatus.COASTING)
 _DELETED = variable(TrackStatus.DELETED)
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@bare
 def begin(plot: Any, dense: bool, w: World) -> None:
     """Start a track from a plot: position the plot's, velocity unknown within the largest speed.
 
@@ -88,7 +88,7 @@ def begin(plot: Any, dense: bool, w: World) -> None:
     report(track, _TENTATIVE, YES, YES, plot, 1.0, NO, plot.t, par, w.books)
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@bare
 def kill(track: Any, index: int, books: Books) -> None:
     """Have the track buried at the end of the bin."""
     if not track.dead:
@@ -97,7 +97,7 @@ def kill(track: Any, index: int, books: Books) -> None:
         books.size[N_DEAD] += 1
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@bare
 def serve(
     track: Any, index: int, hit: bool, seen: bool, plot: Any, probability: float, rough: bool, beam: Any,
     par: Any, books: Books,
@@ -138,7 +138,7 @@ def serve(
         report(track, status, hit, seen, plot, probability, rough, t_pass, par, books)
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@bare
 def _highest_score(par: Any) -> float:
     """The score that `delete_misses` misses in a row, and no fewer, take away."""
     miss = math.log(max(1.0 - par.p_d * par.p_g, 1e-3))
@@ -146,7 +146,7 @@ def _highest_score(par: Any) -> float:
     return highest
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@bare
 def _keep(track: Any, index: int, hit: bool, par: Any, books: Books) -> int:
     """Coast or delete a confirmed track; its status after this pass.
 
@@ -162,7 +162,7 @@ def _keep(track: Any, index: int, hit: bool, par: Any, books: Books) -> int:
     return _CONFIRMED if hit else _COASTING
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@bare
 def _judge(track: Any, index: int, hit: bool, par: Any, books: Books) -> int:
     """Find a young track proven, or delete it; its status after this pass."""
     track.peak = max(track.peak, track.score)
@@ -176,7 +176,7 @@ def _judge(track: Any, index: int, hit: bool, par: Any, books: Books) -> int:
     return _TENTATIVE
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@bare
 def confirm(index: int, plot: Any, beam: Any, w: World) -> None:
     """Promote a proven track, whose last plot is `plot`."""
     track, size = w.tracks[index], w.books.size
@@ -194,7 +194,7 @@ def confirm(index: int, plot: Any, beam: Any, w: World) -> None:
     w.books.tally[C_CONFIRMED] += 1
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@bare
 def _widen(P: Array) -> None:
     """Let the velocities of P (4, 4) err `_WIDER` times as much."""
     for i in range(4):
@@ -202,7 +202,7 @@ def _widen(P: Array) -> None:
             P[i, j] *= (_WIDER if i > 1 else 1.0) * (_WIDER if j > 1 else 1.0)
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@bare
 def adopt(index: int, sensor_e: float, sensor_n: float, w: World) -> None:
     """Have the filter take over a track whose moments are given."""
     track, par = w.tracks[index], w.par
@@ -217,14 +217,14 @@ def adopt(index: int, sensor_e: float, sensor_n: float, w: World) -> None:
     _start_belief(track, sensor_e, sensor_n, par, w.belief)
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@bare
 def by_score(track: Any, par: Any) -> bool:
     """Evidence alone decides on the track: by name, or in dense clutter."""
     named = par.initiation == SCORE or par.initiation == BRANCHING
     return bool(named or (par.initiation == AUTO and track.dense))
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@bare
 def _recent_hits(track: Any) -> int:
     hits, left = 0, track.history
     while left:
@@ -233,7 +233,7 @@ def _recent_hits(track: Any) -> int:
     return hits
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@bare
 def _proven(track: Any, par: Any) -> bool:
     """The track is a target's."""
     counted = _recent_hits(track) >= par.confirm_hits
@@ -248,7 +248,7 @@ def _proven(track: Any, par: Any) -> bool:
     return bool(counted and scored)
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@bare
 def _hopeless(track: Any, par: Any) -> bool:
     """The young track will not be confirmed."""
     if by_score(track, par):
@@ -256,7 +256,7 @@ def _hopeless(track: Any, par: Any) -> bool:
     return bool(_recent_hits(track) + max(par.confirm_passes - track.passes, 0) < par.confirm_hits)
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@bare
 def report(
     track: Any, status: int, hit: bool, seen: bool, plot: Any, probability: float, rough: bool, t: float,
     par: Any, books: Books,
@@ -282,45 +282,50 @@ def report(
     row.born, row.approximate, row.mode_3a = track.born, rough, track.mode_3a
 
 
-@njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
+@inlined
 def bury(w: World) -> None:
     """Take the dead out; the last tracks move into the holes, and so does what they believe."""
-    size, tracks, belief = w.books.size, w.tracks, w.belief
-    dead = w.books.dead[: size[N_DEAD]]
-    if dead.size == 0:
+    size, tracks, belief, edges = w.books.size, w.tracks, w.belief, w.edges
+    count = size[N_DEAD]
+    if count == 0:
         return
-    for index in dead:
-        slot = tracks[index].slot
+    for k in range(count):
+        slot = tracks[w.books.dead[k]].slot
         if slot >= 0:
             last = size[N_SLOTS] - 1
             if slot != last:
                 _move(belief, last, slot)
                 tracks[belief.owner[slot]].slot = slot
-            tracks[index].slot = -1
+            tracks[w.books.dead[k]].slot = -1
             size[N_SLOTS] = last
-    left = size[N_TRACKS] - dead.size
-    moved = np.full(dead.size, -1, np.int64)  # where the tracks behind `left` go
+    n = 0
+    for k in range(size[N_EDGES]):
+        if not tracks[edges[k].track].dead:
+            if n != k:
+                edges[n] = edges[k]
+            n += 1
+    size[N_EDGES] = n
+    left = size[N_TRACKS] - count
     mover = size[N_TRACKS] - 1
-    for k in _ascending(dead):
-        index = dead[k]
+    for k in range(count):
+        index = w.books.dead[k]
         if index >= left:
-            break
+            continue
         while tracks[mover].dead:
             mover -= 1
+        tracks[mover].place = index  # for its edges
         tracks[index] = tracks[mover]
-        w.books.wake[index] = w.books.wake[mover]
+        w.books.wake[index, 0], w.books.wake[index, 1] = w.books.wake[mover, 0], w.books.wake[mover, 1]
         if tracks[index].slot >= 0:
             belief.owner[tracks[index].slot] = index
-        moved[mover - left] = index
         mover -= 1
-    for k in range(size[N_EDGES]):
-        edge = w.edges[k]
-        if edge.track >= left:
-            edge.track = moved[edge.track - left]
+    for k in range(n):
+        if edges[k].track >= left:
+            edges[k].track = tracks[edges[k].track].place
     size[N_TRACKS], size[N_DEAD] = left, 0
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@owning
 def _move(belief: Belief, source: int, target: int) -> None:
     belief.owner[target] = belief.owner[source]
     belief.particles[target], belief.weights[target] = belief.particles[source], belief.weights[source]

@@ -19,28 +19,37 @@ CONFIRMED, TENTATIVE, STARTER = 0, 1, 2
 
 STATE = np.dtype(
     [
-        ("id", "i8"),  # ordinal of its first plot
-        ("born", "f8"),  # s, time of its first plot
         ("t", "f8"),  # s, of x and P
         ("x", "f8", (4,)),  # east, north, v_east, v_north
         ("P", "f8", (4, 4)),
         ("curve", "f8", (2,)),  # m/s², acceleration of the forecast; see `gating.predicted`
         ("growth", "f8", (3,)),  # m²/s³, ee, en, nn: the forecast's covariance grows by this times T³
-        ("up", "f8", (2,)),  # m and m/s, height and its rate at `up_t`; NaN unknown
-        ("up_P", "f8", (3,)),  # their covariance pp, pv, vv
-        ("up_t", "f8"),  # s, of the height
-        ("anchor", "f8", (4,)),  # what the particles are offsets from, at t
-        ("cos", "f8"),  # the particles' first axis is the bearing at confirmation
-        ("sin", "f8"),
         ("sd_range", "f8"),  # of its plots: what the next one's are likely to be
         ("sd_azimuth", "f8"),
         ("psi", "f8"),  # unwrapped bearing of the last pass
         ("rho", "f8"),  # beam phase relative to the next pass
         ("half_width", "f8"),  # of the gate, seen from the radar
         ("along", "f8"),  # m, half the extent of the gate in range
+        ("level", "i8"),
+        ("dense", "?"),  # it was born in dense clutter
+        ("claims", "?"),  # it has plots in its gate
+        ("swept", "?"),
+        ("served", "?"),  # in this bin
+        ("dead", "?"),
+        ("voiced", "?"),  # of the branches of one first plot one is reported
+        ("proven", "?"),  # to be confirmed when all who claim its last plot are served
+        ("place", "i8"),  # in the list of open tracks
+        ("first", "i8"),  # of its edges in this bin; -1 none
+        ("id", "i8"),  # ordinal of its first plot
+        ("born", "f8"),  # s, time of its first plot
+        ("up", "f8", (2,)),  # m and m/s, height and its rate at `up_t`; NaN unknown
+        ("up_P", "f8", (3,)),  # their covariance pp, pv, vv
+        ("up_t", "f8"),  # s, of the height
+        ("anchor", "f8", (4,)),  # what the particles are offsets from, at t
+        ("cos", "f8"),  # the particles' first axis is the bearing at confirmation
+        ("sin", "f8"),
         ("score", "f8"),  # log-likelihood ratio: a target against clutter
         ("peak", "f8"),  # the highest score so far
-        ("level", "i8"),
         ("history", "i8"),  # hits of the last passes, as bits
         ("passes", "i8"),
         ("hits", "i8"),
@@ -51,18 +60,9 @@ STATE = np.dtype(
         ("mode_3a", "i8"),
         ("address", "i8"),
         ("agreed", "i8"),  # hits in a row whose identity was the track's own
-        ("place", "i8"),  # in the list of open tracks
-        ("first", "i8"),  # of its edges in this bin; -1 none
         ("near", "f8"),  # false centroids that it met around its plots,
         ("exposure", "f8"),  # and m² and turns where they were counted
-        ("dense", "?"),  # it was born in dense clutter
-        ("voiced", "?"),  # of the branches of one first plot one is reported
-        ("proven", "?"),  # to be confirmed when all who claim its last plot are served
         ("probability", "f8"),  # of that plot
-        ("claims", "?"),  # it has plots in its gate
-        ("swept", "?"),
-        ("served", "?"),  # in this bin
-        ("dead", "?"),
     ],
     align=True,
 )
@@ -264,6 +264,8 @@ class World(NamedTuple):
     pool: Any  # PENDING table
     past: Any  # PAST table
     edges: Any  # EDGE table
+    ends: NDArray[np.int64]  # (edges,) scratch: the tracks that end on one plot
+    mixture: NDArray[np.float64]  # scratch: `kalman.MIXTURE`
     members: Any  # MEMBER table
     pairs: Any  # PAIR table
     relative: NDArray[np.float32]  # (pairs, N) what `filters.log_likelihood` gave

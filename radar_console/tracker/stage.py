@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from radar_console.core.messages import CENTROID, NO_TRACKS, TRACK, Radar, Sector, Table, blank
 from radar_console.core.units import TURN
 from radar_console.estimation.gaussian import Array
+from radar_console.estimation.kalman import MIXTURE
 from radar_console.estimation.particle import normals
 from radar_console.scenario import TrackerSettings
 from radar_console.tracker import cloud, clutter, gating, modes
@@ -452,6 +453,8 @@ def _empty_world(settings: TrackerSettings, radar: Radar, seed: int) -> World:
         pool=np.zeros(64, PENDING),
         past=np.zeros(256, PAST),
         edges=np.zeros(256, EDGE),
+        ends=np.zeros(256, np.int64),
+        mixture=np.zeros(MIXTURE),
         members=np.zeros(64, MEMBER),
         pairs=np.zeros(64, PAIR),
         relative=np.zeros((64, count), np.float32),
@@ -466,6 +469,7 @@ _ROOM = {
     "pool": N_POOL,
     "past": N_PAST,
     "edges": N_EDGES,
+    "ends": N_EDGES,
     "members": N_MEMBERS,
     "pairs": N_PAIRS,
     "relative": N_PAIRS,

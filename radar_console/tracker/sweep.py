@@ -10,9 +10,9 @@ import math
 from typing import Any
 
 import numpy as np
-from numba import njit
 
 from radar_console.tracker import clusters, clutter, gating, management, order, youth
+from radar_console.tracker.kernels import bare, inlined, owning
 from radar_console.tracker.records import (
     N_EDGES,
     N_MEMBERS,
@@ -44,7 +44,7 @@ _ascending = order.ascending
 _OPENED = 1
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@bare
 def sweep(beams: Any, queue: Any, w: World, final: bool) -> int:
     """Process bins until one needs larger tables (`w.need`); the number of bins that are done.
 
@@ -62,11 +62,12 @@ def sweep(beams: Any, queue: Any, w: World, final: bool) -> int:
     return int(beams.size)
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@bare
 def open_bin(beam: Any, queue: Any, w: World, final: bool) -> bool:
     """Gate the bin's plots, and find the clusters to associate; False if there is no room for them."""
     size, need = w.books.size, w.need
-    need[:] = size
+    for k in range(need.size):
+        need[k] = size[k]
     if size[N_PHASE] != _OPENED:
         _find_open(beam, w)
         if not _gate(beam, queue, w):
@@ -80,7 +81,7 @@ def open_bin(beam: Any, queue: Any, w: World, final: bool) -> bool:
     return bool(size[N_PAIRS] <= w.pairs.size)
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@bare
 def close_bin(beam: Any, w: World, final: bool) -> None:
     """Serve confirmed and young tracks, let plots go, bury the dead."""
     _serve_members(beam, w)
@@ -97,7 +98,7 @@ def close_bin(beam: Any, w: World, final: bool) -> None:
     w.books.size[N_PHASE] = 0
 
 
-@njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
+@inlined
 def _find_open(beam: Any, w: World) -> None:
     """List the tracks whose gates the beam has reached and that were not served since."""
     n, wake = 0, w.books.wake
@@ -113,18 +114,53 @@ def _find_open(beam: Any, w: World) -> None:
     w.books.size[N_OPEN] = n
 
 
-@njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
+@inlined
 def _gate(beam: Any, queue: Any, w: World) -> bool:
     """Take the bin's plots from the queue, and join each to the tracks in whose gates it is.
 
-    The plots of a bin are close in angle; in range, each track finds its own by bisection.
+    False if there is no room for them.
     """
-    size, need, par, edges = w.books.size, w.need, w.par, w.edges
-    stop = size[N_QUEUE]
+    size, need, par = w.books.size, w.need, w.par
+    begin = stop = size[N_QUEUE]
     while stop < queue.size and queue[stop].phi < beam.phi:
         stop += 1
-    fresh = queue[size[N_QUEUE] : stop]
-    n, opened = fresh.size, size[N_OPEN]
+    n, opened, first, count = stop - begin, size[N_OPEN], size[N_POOL], size[N_EDGES]
+    if n > 0 and opened > 0:
+        count = _join(queue[begin:stop], beam, w)
+    # Every starter's edge may make a branch, every plot a starter.
+    need[N_EDGES], need[N_POOL] = count, first + n
+    need[N_TRACKS] = size[N_TRACKS] + count + first + n
+    need[N_ROWS] = size[N_ROWS] + opened + 2 * (count + first + n) + _purged(need[N_TRACKS], par)
+    need[N_SLOTS] = size[N_SLOTS] + min(opened + count, first + n)  # a plot confirms one at most
+    need[N_MEMBERS] = opened
+    need[N_PAST] = size[N_PAST] + n
+    if (
+        count > w.edges.size
+        or need[N_PAST] > w.past.size
+        or need[N_POOL] > w.pool.size
+        or need[N_TRACKS] > w.tracks.size
+        or need[N_ROWS] > w.books.rows.size
+        or need[N_SLOTS] > w.belief.owner.size
+        or need[N_MEMBERS] > w.members.size
+    ):
+        return False
+    for k in range(n):
+        w.pool[first + k] = queue[begin + k]
+        _survey(w.pool[first + k], beam, w)
+    size[N_POOL], size[N_EDGES], size[N_QUEUE] = first + n, count, stop
+    for place in range(opened):
+        track = w.tracks[w.opened[place]]
+        track.swept = track.rho >= track.half_width + _MARGIN
+    return True
+
+
+@owning
+def _join(fresh: Any, beam: Any, w: World) -> int:
+    """Join the plots that are `fresh` to tracks; how many edges there are then, with or without room.
+
+    The plots of a bin are close in angle; in range, each track finds its own by bisection.
+    """
+    size, par, edges, n = w.books.size, w.par, w.edges, fresh.size
     distance, lag = np.empty(n), 0.0
     for k in range(n):
         distance[k] = math.hypot(fresh[k].e - beam.e, fresh[k].n - beam.n)
@@ -132,10 +168,10 @@ def _gate(beam: Any, queue: Any, w: World) -> bool:
     by_range = _ascending(distance)
     distance = distance[by_range]
     first, count = size[N_POOL], size[N_EDGES]
-    for place in range(opened):
+    for place in range(size[N_OPEN]):
         index = w.opened[place]
         track = w.tracks[index]
-        if track.swept or n == 0:
+        if track.swept:
             continue
         T = max(beam.t - track.t, 0.0)
         e = track.x[0] + T * track.x[2] + 0.5 * T * T * track.curve[0] - beam.e
@@ -156,40 +192,16 @@ def _gate(beam: Any, queue: Any, w: World) -> bool:
                     edge.spent = False
                 count += 1
                 track.claims = True
-    # Every starter's edge may make a branch, every plot a starter.
-    need[N_EDGES], need[N_POOL] = count, first + n
-    need[N_TRACKS] = size[N_TRACKS] + count + first + n
-    need[N_ROWS] = size[N_ROWS] + opened + 2 * (count + first + n) + _purged(need[N_TRACKS], par)
-    need[N_SLOTS] = size[N_SLOTS] + min(opened + count, first + n)  # a plot confirms one at most
-    need[N_MEMBERS] = opened
-    need[N_PAST] = size[N_PAST] + n
-    if (
-        count > edges.size
-        or need[N_PAST] > w.past.size
-        or need[N_POOL] > w.pool.size
-        or need[N_TRACKS] > w.tracks.size
-        or need[N_ROWS] > w.books.rows.size
-        or need[N_SLOTS] > w.belief.owner.size
-        or need[N_MEMBERS] > w.members.size
-    ):
-        return False
-    for k in range(n):
-        w.pool[first + k] = fresh[k]
-        _survey(w.pool[first + k], beam, w)
-    size[N_POOL], size[N_EDGES], size[N_QUEUE] = first + n, count, stop
-    for place in range(opened):
-        track = w.tracks[w.opened[place]]
-        track.swept = track.rho >= track.half_width + _MARGIN
-    return True
+    return int(count)
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@bare
 def _purged(tracks: int, par: Any) -> int:
     """Rows that the end of the capacity may need."""
     return tracks if tracks > par.max_tracks else 0
 
 
-@njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
+@inlined
 def _link(w: World) -> None:
     """Chain each track's edges, in the order in which they came."""
     for k in range(w.books.size[N_EDGES] - 1, -1, -1):

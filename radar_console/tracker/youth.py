@@ -16,12 +16,17 @@ import math
 from typing import Any
 
 import numpy as np
-from numba import njit
 
 from radar_console.core.messages import TrackStatus
 from radar_console.estimation import particle
-from radar_console.estimation.kalman import condition_in_place, predict_in_place, update_in_place
+from radar_console.estimation.kalman import (
+    add_alternative,
+    condition_in_place,
+    mix_in_place,
+    predict_in_place,
+)
 from radar_console.tracker import clusters, clutter, gating, height, management, order
+from radar_console.tracker.kernels import bare, inlined, owning
 from radar_console.tracker.records import (
     AUTO,
     BRANCHING,
@@ -62,7 +67,7 @@ _TRIAL = 2.2  # of the score, which a pair in dense clutter may lose: there are 
 _PURGE = 0.95  # of the capacity is left when it was exceeded
 
 
-@njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
+@inlined
 def settle(beam: Any, w: World, final: bool) -> None:
     """Serve the young tracks that the beam has passed, once no open confirmed track claims their plots."""
     size, tracks, pool, edges = w.books.size, w.tracks, w.pool, w.edges
@@ -91,76 +96,104 @@ def settle(beam: Any, w: World, final: bool) -> None:
                 _settle_alone(index, beam, w)
 
 
-@njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
+@bare
 def _settle_alone(index: int, beam: Any, w: World) -> None:
-    """Probabilistic data association of one track by itself."""
+    """Probabilistic data association of one track by itself; the edges' densities become weights."""
     track, pool, edges, par = w.tracks[index], w.pool, w.edges, w.par
-    count, k = 0, track.first
-    while k >= 0:
-        count += 1
-        k = edges[k].next
     miss = 1.0 - par.p_d * par.p_g
-    if count == 0:
-        track.score += math.log(max(miss, 1e-300))
-        _serve(track, index, NO, NO, pool[0], math.nan, NO, beam, par, w.books)
-        return
-    beta, chosen = np.empty(count), np.empty(count, np.int64)
-    n, total, best, k = 0, miss, -1, track.first
+    total, best, k = miss, -1, track.first
     while k >= 0:
-        plot = pool[edges[k].plot]
+        plot, weight = pool[edges[k].plot], 0.0
         # A plot that a confirmed track still waits for is left to it.
         if plot.weight > 0.0 and not plot.awaited:
             weight = par.p_d / _doubted(track, plot, par) * edges[k].density
             weight *= plot.weight * _evidence(track, plot, par)
             if weight > _PRUNE * miss:
-                beta[n], chosen[n] = weight, edges[k].plot
                 total += weight
-                if best < 0 or weight > beta[best]:
-                    best = n
-                n += 1
+                if best < 0 or weight > edges[best].density:
+                    best = k
+            else:
+                weight = 0.0
+        edges[k].density = weight
         k = edges[k].next
     track.score += math.log(max(total, 1e-300))
     if best < 0:
         _serve(track, index, NO, NO, pool[0], math.nan, NO, beam, par, w.books)
         return
-    used = 0.0
-    for j in range(n):
-        beta[j] /= total
-        used += beta[j]
-    _update_tentative(track, beta[:n], chosen[:n], pool, par)
-    _serve(track, index, used >= 0.5, YES, pool[chosen[best]], beta[best], NO, beam, par, w.books)
+    _update_by_edges(track, total, w)
+    probability, hit = edges[best].density / total, total - miss >= 0.5 * total
+    _serve(track, index, hit, YES, pool[edges[best].plot], probability, NO, beam, par, w.books)
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
-def _update_tentative(track: Any, beta: Any, chosen: Any, pool: Any, par: Any) -> None:
-    """The Kalman update with alternatives; the new time is their mean by probability."""
-    m = beta.size
-    origin, total, t = pool[chosen[0]].t, 0.0, 0.0
-    for j in range(m):
-        total += beta[j]
-        t += beta[j] * (pool[chosen[j]].t - origin)
-    t = max(origin + (t / total if total > 0.0 else 0.0), track.t)
+@bare
+def _update_by_edges(track: Any, total: float, w: World) -> None:
+    """The Kalman update with the track's plots, whose weights are the edges' densities, of `total`.
+
+    The new time is their mean by probability.
+    """
+    pool, edges, par, first = w.pool, w.edges, w.par, track.first
+    origin, used, t, heights, k = pool[edges[first].plot].t, 0.0, 0.0, False, first
+    while k >= 0:
+        used += edges[k].density
+        t += edges[k].density * (pool[edges[k].plot].t - origin)
+        heights |= edges[k].density > 0.0 and math.isfinite(pool[edges[k].plot].up)
+        k = edges[k].next
+    t = max(origin + t / used, track.t)
     predict_in_place(track.x, track.P, t - track.t, par.q)
     track.t = t
-    # Each plot twice: with the noise it claims, and as an outlier.
-    z, R, lag, part = np.empty((2 * m, 2)), np.empty((2 * m, 3)), np.empty(2 * m), np.empty(2 * m)
-    for j in range(m):
-        plot = pool[chosen[j]]
-        later = max(plot.t, t) - t
-        narrow = (1.0 - par.outliers) * _density_of(track, later, plot, 1.0)
-        broad = par.outliers * _density_of(track, later, plot, _BROAD)
-        share = broad / (narrow + broad) if narrow + broad > 0.0 else 0.0
-        for k in range(2):
-            n = 2 * j + k
-            z[n, 0], z[n, 1], lag[n] = plot.e, plot.n, plot.t - t
-            scale = _BROAD if k else 1.0
-            R[n, 0], R[n, 1], R[n, 2] = scale * plot.ee, scale * plot.en, scale * plot.nn
-            part[n] = beta[j] * (share if k else 1.0 - share)
-    update_in_place(track.x, track.P, z, R, lag, part)
-    _update_height(track, pool, chosen, beta, par.up_q)
+    w.mixture[:] = 0.0
+    k = first
+    while k >= 0:
+        if edges[k].density > 0.0:
+            _add(track, pool[edges[k].plot], edges[k].density / total, par, w.mixture)
+        k = edges[k].next
+    mix_in_place(track.x, track.P, w.mixture)
+    if heights:
+        _learn_height(track, total, w)
 
 
-@njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
+@bare
+def _update_by_plot(track: Any, plot: Any, w: World) -> None:
+    """The Kalman update with one plot that may be an outlier."""
+    t = max(plot.t, track.t)
+    predict_in_place(track.x, track.P, t - track.t, w.par.q)
+    track.t = t
+    w.mixture[:] = 0.0
+    _add(track, plot, 1.0, w.par, w.mixture)
+    mix_in_place(track.x, track.P, w.mixture)
+
+
+@bare
+def _add(track: Any, plot: Any, beta: float, par: Any, A: Any) -> None:
+    """An alternative of the update: the plot with the noise that it claims, and as an outlier."""
+    lag = plot.t - track.t
+    later = max(lag, 0.0)
+    narrow = (1.0 - par.outliers) * _density_of(track, later, plot, 1.0)
+    broad = par.outliers * _density_of(track, later, plot, _BROAD)
+    odd = beta * broad / (narrow + broad) if narrow + broad > 0.0 else 0.0
+    x, P, e, n, ee, en, nn = track.x, track.P, plot.e, plot.n, plot.ee, plot.en, plot.nn
+    add_alternative(x, P, e, n, ee, en, nn, lag, beta - odd, A)
+    if odd > 0.0:
+        add_alternative(x, P, e, n, _BROAD * ee, _BROAD * en, _BROAD * nn, lag, odd, A)
+
+
+@owning
+def _learn_height(track: Any, total: float, w: World) -> None:
+    """Update the height with the track's plots, whose weights are the edges' densities, of `total`."""
+    edges, count, k = w.edges, 0, track.first
+    while k >= 0:
+        count += edges[k].density > 0.0
+        k = edges[k].next
+    beta, chosen, n, k = np.empty(count), np.empty(count, np.int64), 0, track.first
+    while k >= 0:
+        if edges[k].density > 0.0:
+            beta[n], chosen[n] = edges[k].density / total, edges[k].plot
+            n += 1
+        k = edges[k].next
+    _update_height(track, w.pool, chosen, beta, w.par.up_q)
+
+
+@inlined
 def _settle_branching(index: int, beam: Any, w: World) -> None:
     """Branch: each plot in the gate makes a track of its own; the likeliest one is reported on.
 
@@ -202,12 +235,12 @@ def _settle_branching(index: int, beam: Any, w: World) -> None:
     _serve(track, index, NO, NO, pool[0], math.nan, NO, beam, par, w.books)
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@bare
 def _branches(track: Any, par: Any) -> bool:
     return bool(par.initiation == BRANCHING or (par.initiation == AUTO and track.dense))
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@bare
 def _branch(index: int, k: int, voiced: bool, beam: Any, w: World) -> None:
     """A tentative track from another and the plot of edge `k`, whose likelihood ratio is its density."""
     child, edge = w.books.size[N_TRACKS], w.edges[k]
@@ -220,28 +253,33 @@ def _branch(index: int, k: int, voiced: bool, beam: Any, w: World) -> None:
         track.peak = track.score + (_DROP - _TRIAL if track.dense else 0.0)
     track.level, track.voiced, track.first, track.claims = TENTATIVE, voiced, -1, False
     if track.dense:  # where an outlier is as good as a false plot
-        _take(track, chosen, w.pool, w.par)
+        _take(track, w.pool[chosen], w.par)
     else:
-        _update_tentative(track, np.ones(1), np.full(1, chosen), w.pool, w.par)
+        _update_by_plot(track, w.pool[chosen], w)
+    if math.isfinite(w.pool[chosen].up):
+        _take_height(track, chosen, w)
     _serve(track, child, YES, YES, w.pool[chosen], 1.0, NO, beam, w.par, w.books)
     track.served = track.swept = False
     if track.hits > 2:
         edge.track, edge.spent = child, True
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
-def _take(track: Any, chosen: int, pool: Any, par: Any) -> None:
-    """The Kalman update with the plot `chosen` of `pool`."""
-    plot = pool[chosen]
+@owning
+def _take(track: Any, plot: Any, par: Any) -> None:
+    """The Kalman update with one plot."""
     t = max(plot.t, track.t)
     predict_in_place(track.x, track.P, t - track.t, par.q)
     track.t = t
     condition_in_place(track.x, track.P, plot.e, plot.n, plot.ee, plot.en, plot.nn)
-    if math.isfinite(plot.up):
-        _update_height(track, pool, np.full(1, chosen), np.ones(1), par.up_q)
 
 
-@njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
+@owning
+def _take_height(track: Any, chosen: int, w: World) -> None:
+    """Update the height with the plot `chosen` of the pool."""
+    _update_height(track, w.pool, np.full(1, chosen), np.ones(1), w.par.up_q)
+
+
+@inlined
 def retire(beam: Any, w: World) -> None:
     """Let go the plots that no track waits for: merge the tracks that end there, and start new ones."""
     size, tracks, pool, edges = w.books.size, w.tracks, w.pool, w.edges
@@ -257,30 +295,31 @@ def retire(beam: Any, w: World) -> None:
         if not edge.spent:
             plot.mark = _HELD
         edge.next, plot.head = plot.head, k
-    moved = np.empty(size[N_POOL], np.int64)
     n = 0
     for p in range(size[N_POOL]):
-        plot = pool[p]
+        plot, place, k = pool[p], -1, pool[p].head
         if plot.mark == _HELD:
-            moved[p] = n
-            if n != p:
-                pool[n] = pool[p]
+            place = n
             n += 1
         else:
-            moved[p] = -1
             taken = plot.head >= 0 and _merge(plot, beam, w)
             _start(plot, not taken, w)
+        while k >= 0:
+            edges[k].plot = place
+            k = edges[k].next
+        if 0 <= place < p:
+            pool[place] = pool[p]
     size[N_POOL] = n
     n = 0
     for k in range(size[N_EDGES]):
-        if moved[edges[k].plot] >= 0 and not tracks[edges[k].track].dead:
-            edges[n] = edges[k]
-            edges[n].plot = moved[edges[n].plot]
+        if edges[k].plot >= 0 and not tracks[edges[k].track].dead:
+            if n != k:
+                edges[n] = edges[k]
             n += 1
     size[N_EDGES] = n
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@bare
 def _merge(plot: Any, beam: Any, w: World) -> bool:
     """Settle which of the tracks that end on a plot go on; True if one of them was confirmed by it.
 
@@ -288,12 +327,8 @@ def _merge(plot: Any, beam: Any, w: World) -> bool:
     the young ones are thinned out: branches in nearly the same state are made one; of others whose
     last two plots are the same the likeliest stays.
     """
-    edges, tracks = w.edges, w.tracks
-    count, k, winner = 0, plot.head, -1
-    while k >= 0:
-        count += 1
-        k = edges[k].next
-    ends, n, k = np.empty(count, np.int64), 0, plot.head
+    edges, tracks, ends = w.edges, w.tracks, w.ends
+    n, winner, k = 0, -1, plot.head
     while k >= 0:
         index = edges[k].track
         track = tracks[index]
@@ -324,11 +359,15 @@ def _merge(plot: Any, beam: Any, w: World) -> bool:
             if same and _before(ends[j], stays, w):
                 stays = ends[j]
         _absorb(stays, ends[:n], YES, w)
-    _pool(ends[:n], w)
+    several = 0
+    for i in range(n):
+        several += not tracks[ends[i]].dead and tracks[ends[i]].hits > 2
+    if several > 1:
+        _pool(ends[:n], w)
     return False
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@bare
 def _is_known(track: Any, w: World) -> bool:
     """A confirmed track may be the young one's target: it waits until they are apart, or it has faded.
 
@@ -348,7 +387,7 @@ def _is_known(track: Any, w: World) -> bool:
     return False
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@bare
 def _drop(index: int, w: World) -> None:
     """Give up a young track for another one's sake."""
     track = w.tracks[index]
@@ -358,7 +397,7 @@ def _drop(index: int, w: World) -> None:
     _kill(track, index, w.books)
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@owning
 def _pool(ends: Any, w: World) -> None:
     """Of the tracks with three plots or more that end on one plot only the likeliest go on.
 
@@ -370,8 +409,6 @@ def _pool(ends: Any, w: World) -> None:
         if not track.dead and track.hits > 2:
             score[n], index[n] = -track.score, i
             n += 1
-    if n < 2:
-        return
     kept, roots, m = np.empty(_MOST_ENDS, np.int64), np.empty((_MOST_ENDS, 4, 4)), 0
     for k in _ascending(score[:n]):
         b, into = w.tracks[index[k]], -1
@@ -394,7 +431,7 @@ def _pool(ends: Any, w: World) -> None:
         _drop(index[k], w)
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@owning
 def _root(P: Any, L: Any) -> None:
     """Cholesky's root L (4, 4) of P, its diagonal inverted."""
     for i in range(4):
@@ -405,7 +442,7 @@ def _root(P: Any, L: Any) -> None:
             L[i, j] = s * L[j, j] if j < i else 1.0 / math.sqrt(max(s, 1e-12))
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@owning
 def _distance(x: Any, L: Any, y: Any) -> float:
     """Squared Mahalanobis distance of the states x and y (4,); L is the covariance's root."""
     z, d2 = np.empty(4), 0.0
@@ -418,7 +455,7 @@ def _distance(x: Any, L: Any, y: Any) -> float:
     return d2
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@owning
 def _blend(a: Any, b: Any) -> None:
     """Let `a` be the mixture of itself and the less likely `b`, by its first two moments."""
     odds = math.exp(b.score - a.score)
@@ -434,7 +471,7 @@ def _blend(a: Any, b: Any) -> None:
     a.peak = max(a.peak, a.score)
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@bare
 def _before(a: int, b: int, w: World) -> bool:
     """The track `a` goes before `b`: it is confirmed, or likelier, or older."""
     one, other = w.tracks[a], w.tracks[b]
@@ -443,7 +480,7 @@ def _before(a: int, b: int, w: World) -> bool:
     return bool((one.score, -one.id) > (other.score, -other.id))
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@bare
 def _absorb(stays: int, ends: Any, same: bool, w: World) -> None:
     """Have one track speak for the young ones that end on its plot; `same`: and have its last but one."""
     a, heir, born = w.tracks[stays], -1, 0.0
@@ -463,7 +500,7 @@ def _absorb(stays: int, ends: Any, same: bool, w: World) -> None:
         a.id, a.born, a.voiced = heir, born, True
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@bare
 def _start(plot: Any, free: bool, w: World) -> None:
     """Let a `free` plot that no confirmed track has used start a track."""
     if plot.extended:
@@ -477,12 +514,16 @@ def _start(plot: Any, free: bool, w: World) -> None:
         w.books.tally[C_STARTED] += 1
 
 
-@njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
+@inlined
 def purge(w: World) -> None:
     """When there are more tracks than the capacity, the least likely young ones go."""
+    if w.books.size[N_TRACKS] - w.books.size[N_DEAD] > w.par.max_tracks:
+        _purge(w)
+
+
+@owning
+def _purge(w: World) -> None:
     size, tracks = w.books.size, w.tracks
-    if size[N_TRACKS] - size[N_DEAD] <= w.par.max_tracks:
-        return
     score, index, n = np.empty(size[N_TRACKS]), np.empty(size[N_TRACKS], np.int64), 0
     for i in range(size[N_TRACKS]):
         if tracks[i].level != CONFIRMED and not tracks[i].dead:

@@ -55,7 +55,9 @@ def test_the_compiled_steps_are_the_batched_ones():
         z, R = rng.normal(size=2), np.array([[2.0, 0.3], [0.3, 1.0]])
         expected, _ = kalman.update(expected, z, H, R)
         alone = x.copy(), P.copy()
-        kalman.update_in_place(x, P, z[None], np.array([[2.0, 0.3, 1.0]]), np.zeros(1), np.ones(1))
+        A = np.zeros(kalman.MIXTURE)
+        kalman.add_alternative(x, P, *z, 2.0, 0.3, 1.0, 0.0, 1.0, A)
+        kalman.mix_in_place(x, P, A)
         kalman.condition_in_place(*alone, *z, 2.0, 0.3, 1.0)
         for mean, cov in ((x, P), alone):
             assert np.allclose(mean, expected.mean, rtol=0, atol=1e-10)
@@ -77,7 +79,10 @@ def test_alternatives_are_the_collapsed_mixture():
         Gaussian(np.stack([p.mean for p in parts]), np.stack([p.cov for p in parts])),
     )
     x, P = state.mean.copy(), state.cov.copy()
-    kalman.update_in_place(x, P, z, R, lag, beta)
+    A = np.zeros(kalman.MIXTURE)
+    for j in range(3):
+        kalman.add_alternative(x, P, *z[j], *R[j], lag[j], beta[j], A)
+    kalman.mix_in_place(x, P, A)
     assert np.allclose(x, expected.mean, rtol=0, atol=1e-12)
     assert np.allclose(P, expected.cov, rtol=0, atol=1e-10)
 
