@@ -2,7 +2,7 @@
 PYTHON := .venv/bin/python
 READY  := .venv/.ready
 COMPILED := .venv/.compiled
-KERNELS := $(shell grep -rl --include='*.py' njit radar_console)
+KERNELS := $(shell grep -rl --include='*.py' -e njit -e tracker.kernels radar_console)
 JOBS   ?= 2
 ARGS   ?=
 

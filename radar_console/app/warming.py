@@ -6,7 +6,7 @@ import sys
 from collections.abc import Callable
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Any
+from typing import Any, cast
 
 from numba.core import event
 
@@ -33,7 +33,8 @@ def warm_up() -> None:
 
 def is_cold() -> bool:
     """The tracker was never compiled here."""
-    return not any(Path(str(sweep.stats.cache_path)).glob("sweep.sweep-*.nbi"))
+    cache = Path(str(cast(Any, sweep).stats.cache_path))
+    return not any(cache.glob("sweep.sweep-*.nbi"))
 
 
 def ensure_warm(say: Callable[[str], None]) -> None:

@@ -6,7 +6,6 @@ weighs a plot, and `update` conditions on plots with their association probabili
 
 from typing import Any
 
-
 from radar_console.estimation.gaussian import Array
 from radar_console.estimation.particle import Singles
 from radar_console.tracker import bank, cloud

@@ -3,7 +3,6 @@
 import math
 from typing import Any
 
-
 from radar_console.tracker.kernels import bare
 from radar_console.tracker.records import CONFIRMED, STARTER
 

@@ -9,7 +9,6 @@ from typing import Any
 
 from radar_console.tracker.kernels import bare
 
-
 # Likelihood ratios: the report is of this target, against any other's.
 SAME_ADDRESS, OTHER_ADDRESS = 1e3, 1e-3
 SAME_CODE, OTHER_CODE = 50.0, 0.02

@@ -5,13 +5,29 @@ world's two dozen arrays these cost more, with each call, than what most kernels
 hands this choice down to whatever is called, so those that make arrays say so.
 """
 
+from collections.abc import Callable
+from typing import Any, TypeVar, cast
+
 from numba import njit
 
-bare = njit(cache=True, nogil=True, error_model="numpy", _nrt=False)
-"""Makes no arrays, and calls nothing that returns one."""
+Kernel = TypeVar("Kernel", bound=Callable[..., Any])
 
-inlined = njit(cache=True, nogil=True, error_model="numpy", forceinline=True, _nrt=False)
-"""The same, for a part of a bin's work that stands in one place."""
 
-owning = njit(cache=True, nogil=True, error_model="numpy", _nrt=True)
-"""Makes arrays, and lets them go."""
+def _compiled(counted: bool, forceinline: bool = False) -> Callable[[Kernel], Kernel]:
+    options = {"cache": True, "nogil": True, "error_model": "numpy", "_nrt": counted}
+    return cast(Callable[[Kernel], Kernel], cast(Any, njit)(**options, forceinline=forceinline))
+
+
+def bare(kernel: Kernel) -> Kernel:
+    """Makes no arrays, and calls nothing that returns one."""
+    return _compiled(counted=False)(kernel)
+
+
+def inlined(kernel: Kernel) -> Kernel:
+    """The same, for a part of a bin's work that stands in one place."""
+    return _compiled(counted=False, forceinline=True)(kernel)
+
+
+def owning(kernel: Kernel) -> Kernel:
+    """Makes arrays, and lets them go."""
+    return _compiled(counted=True)(kernel)
