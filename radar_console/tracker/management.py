@@ -11,6 +11,16 @@ from radar_console.tracker import clutter, filters, gating, height, identity
 from radar_console.tracker.kernels import bare, inlined, owning
 from radar_console.tracker.records import (
     AUTO,
+    B_BORN,
+    B_CURVE,
+    B_E,
+    B_N,
+    B_REACH,
+    B_REACH_T,
+    B_REACH_TT,
+    B_T,
+    B_V_E,
+    B_V_N,
     BRANCHING,
     C_BLANKED,
     C_CONFIRMED,
@@ -28,6 +38,7 @@ from radar_console.tracker.records import (
     SCORE,
     STARTER,
     TENTATIVE,
+    WHEREABOUTS,
     YES,
     Belief,
     Books,
@@ -124,6 +135,8 @@ def serve(
     if seen:
         track.sd_range = max(plot.sd_range, 0.9 * track.sd_range)
         track.sd_azimuth = max(plot.sd_azimuth, 0.9 * track.sd_azimuth)
+        if track.level == CONFIRMED:
+            note(track, books)
     if hit:
         track.hits += 1
         track.previous, track.last = track.last, plot.ordinal
@@ -136,6 +149,41 @@ def serve(
     track.probability = probability
     if track.voiced and not track.proven:
         report(track, status, hit, seen, plot, probability, rough, t_pass, par, books)
+
+
+@bare
+def note(track: Any, books: Books) -> None:
+    """Keep where a confirmed track is where all can be looked through in one go, see `near`.
+
+    In T seconds its position's deviation grows by no more than T times its velocity's, and what the
+    forecast adds, √(g T³), is no more than √g (T + T²) / 2.
+    """
+    x, P, curve, growth, row = track.x, track.P, track.curve, track.growth, books.whereabouts[track.slot]
+    row[B_BORN], row[B_T], row[B_E], row[B_N], row[B_V_E], row[B_V_N] = (
+        track.born,
+        track.t,
+        x[0],
+        x[1],
+        x[2],
+        x[3],
+    )
+    half = 0.5 * math.sqrt(max(growth[0] + growth[2], 0.0))
+    row[B_REACH] = math.sqrt(max(P[0, 0] + P[1, 1], 0.0))
+    row[B_REACH_T] = math.sqrt(max(P[2, 2] + P[3, 3], 0.0)) + half
+    row[B_REACH_TT] = half
+    row[B_CURVE] = 0.5 * math.hypot(curve[0], curve[1])
+
+
+@bare
+def may_be_near(slot: int, track: Any, spread: float, sigmas: float, books: Books) -> bool:
+    """The confirmed track of a slot may be within so many deviations of the other, whose own is `spread`."""
+    row = books.whereabouts[slot]
+    T = max(track.t - row[B_T], 0.0)
+    reach = (
+        sigmas * (spread + row[B_REACH] + T * (row[B_REACH_T] + T * row[B_REACH_TT])) + T * T * row[B_CURVE]
+    )
+    de, dn = row[B_E] + T * row[B_V_E] - track.x[0], row[B_N] + T * row[B_V_N] - track.x[1]
+    return bool(not de * de + dn * dn > reach * reach)
 
 
 @bare
@@ -191,6 +239,7 @@ def confirm(index: int, plot: Any, beam: Any, w: World) -> None:
     if w.par.filter == PARTICLE:
         _widen(track.P)
     _start_belief(track, beam.e, beam.n, w.par, w.belief)
+    note(track, w.books)
     w.books.tally[C_CONFIRMED] += 1
 
 
@@ -215,6 +264,7 @@ def adopt(index: int, sensor_e: float, sensor_n: float, w: World) -> None:
     w.books.size[N_SLOTS] += 1
     w.books.size[N_TRACKS] += 1
     _start_belief(track, sensor_e, sensor_n, par, w.belief)
+    note(track, w.books)
 
 
 @bare
@@ -295,6 +345,8 @@ def bury(w: World) -> None:
             last = size[N_SLOTS] - 1
             if slot != last:
                 _move(belief, last, slot)
+                for column in range(WHEREABOUTS):
+                    w.books.whereabouts[slot, column] = w.books.whereabouts[last, column]
                 tracks[belief.owner[slot]].slot = slot
             tracks[w.books.dead[k]].slot = -1
             size[N_SLOTS] = last

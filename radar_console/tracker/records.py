@@ -40,6 +40,11 @@ STATE = np.dtype(
         ("proven", "?"),  # to be confirmed when all who claim its last plot are served
         ("place", "i8"),  # in the list of open tracks
         ("first", "i8"),  # of its edges in this bin; -1 none
+        ("score", "f8"),  # log-likelihood ratio: a target against clutter
+        ("last", "i8"),  # ordinal of the plot of its last hit
+        ("previous", "i8"),  # of the hit before; -1 none
+        ("misses", "i8"),  # in a row
+        ("hits", "i8"),
         ("id", "i8"),  # ordinal of its first plot
         ("born", "f8"),  # s, time of its first plot
         ("up", "f8", (2,)),  # m and m/s, height and its rate at `up_t`; NaN unknown
@@ -48,14 +53,9 @@ STATE = np.dtype(
         ("anchor", "f8", (4,)),  # what the particles are offsets from, at t
         ("cos", "f8"),  # the particles' first axis is the bearing at confirmation
         ("sin", "f8"),
-        ("score", "f8"),  # log-likelihood ratio: a target against clutter
         ("peak", "f8"),  # the highest score so far
         ("history", "i8"),  # hits of the last passes, as bits
         ("passes", "i8"),
-        ("hits", "i8"),
-        ("misses", "i8"),  # in a row
-        ("last", "i8"),  # ordinal of the plot of its last hit
-        ("previous", "i8"),  # of the hit before; -1 none
         ("slot", "i8"),  # of its particles; -1 none
         ("mode_3a", "i8"),
         ("address", "i8"),
@@ -242,12 +242,19 @@ N_TRACKS, N_POOL, N_EDGES, N_SLOTS, N_ROWS, N_QUEUE, N_OPEN, N_MEMBERS, N_PAIRS,
 SIZES = 12
 
 
+# Columns of a confirmed track's whereabouts: when it was born; time, position and velocity; a quadratic of the
+# time since then that bounds its deviation; and half its acceleration.
+B_BORN, B_T, B_E, B_N, B_V_E, B_V_N, B_REACH, B_REACH_T, B_REACH_TT, B_CURVE = range(10)
+WHEREABOUTS = 10
+
+
 class Books(NamedTuple):
     """What the accounting of a pass writes; handed on by itself, since it is small."""
 
     rows: Any  # TRACK table
     wake: NDArray[np.float64]  # (tracks, 2) beam angle and time before which a gate can't be reached
     dead: NDArray[np.int64]  # (tracks,) the rows to be buried at the bin's end
+    whereabouts: NDArray[np.float64]  # (slots, WHEREABOUTS) of confirmed tracks, see `management.note`
     blank: NDArray[np.bool_]  # (bins,) the radar did not look
     size: NDArray[np.int64]  # (SIZES,)
     tally: NDArray[np.int64]  # (counts,)

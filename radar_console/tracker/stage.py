@@ -45,6 +45,7 @@ from radar_console.tracker.records import (
     SIZES,
     STATE,
     SWEPT_COUNTS,
+    WHEREABOUTS,
     Belief,
     Books,
     World,
@@ -445,6 +446,7 @@ def _empty_world(settings: TrackerSettings, radar: Radar, seed: int) -> World:
             rows=np.zeros(256, TRACK),
             wake=np.zeros((64, 2)),
             dead=np.zeros(64, np.int64),
+            whereabouts=np.zeros((slots, WHEREABOUTS)),
             blank=np.zeros(settings.bins, np.bool_),
             size=np.zeros(SIZES, np.int64),
             tally=np.zeros(len(SWEPT_COUNTS), np.int64),
@@ -474,7 +476,7 @@ _ROOM = {
     "pairs": N_PAIRS,
     "relative": N_PAIRS,
 }
-_BOOK_ROOM = {"rows": N_ROWS, "wake": N_TRACKS, "dead": N_TRACKS}
+_BOOK_ROOM = {"rows": N_ROWS, "wake": N_TRACKS, "dead": N_TRACKS, "whereabouts": N_SLOTS}
 
 
 def _grown(world: World) -> World:

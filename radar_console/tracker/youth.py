@@ -29,6 +29,7 @@ from radar_console.tracker import clusters, clutter, gating, height, management,
 from radar_console.tracker.kernels import bare, inlined, owning
 from radar_console.tracker.records import (
     AUTO,
+    B_BORN,
     BRANCHING,
     C_CAPPED,
     C_EXTENDED,
@@ -54,7 +55,8 @@ _density_of, _predicted, _MARGIN = gating.density_of, gating.predicted, gating.M
 _density_at, _doubted = clutter.density_at, clutter.doubted
 _evidence, _update_height = clusters.evidence, height.update
 _serve, _begin, _kill, _report = management.serve, management.begin, management.kill, management.report
-_confirm, _DROP, _ascending = management.confirm, management.DROP, order.ascending
+_confirm, _may_be_near = management.confirm, management.may_be_near
+_DROP, _ascending = management.DROP, order.ascending
 _TENTATIVE = variable(TrackStatus.TENTATIVE)
 _DELETED = variable(TrackStatus.DELETED)
 _PRUNE = 1e-3  # of the miss: a pair that is less likely is no pair
@@ -62,7 +64,8 @@ _NOBODY, _HELD = -2, -3  # marks of a plot: no track waits for it; some do
 _DENSE = 0.3  # false plots in the gate of a track's second plot, from which on clutter counts as dense
 _MOST_ENDS = 8  # branches that may end on one plot
 _SAME = 4.0  # squared Mahalanobis distance of states, below which two branches are one
-_APART = 25.0  # the same of positions, from which on a young track is not a confirmed one's target
+_SIGMAS_APART = 5.0  # of positions, from which on a young track is not a confirmed one's target
+_APART = _SIGMAS_APART**2
 _TRIAL = 2.2  # of the score, which a pair in dense clutter may lose: there are others
 _PURGE = 0.95  # of the capacity is left when it was exceeded
 
@@ -373,7 +376,11 @@ def _is_known(track: Any, w: World) -> bool:
 
     Branches of one first plot share what had been found before they parted.
     """
+    spread = math.sqrt(track.P[0, 0] + track.P[1, 1])
     for slot in range(w.books.size[N_SLOTS]):
+        kin = w.books.whereabouts[slot, B_BORN] == track.born
+        if not kin and not _may_be_near(slot, track, spread, _SIGMAS_APART, w.books):
+            continue
         other = w.tracks[w.belief.owner[slot]]
         if other.dead:
             continue
