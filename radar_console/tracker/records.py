@@ -242,8 +242,8 @@ N_TRACKS, N_POOL, N_EDGES, N_SLOTS, N_ROWS, N_QUEUE, N_OPEN, N_MEMBERS, N_PAIRS,
 SIZES = 12
 
 
-# Columns of a confirmed track's whereabouts: when it was born; time, position and velocity; a quadratic of the
-# time since then that bounds its deviation; and half its acceleration.
+# Columns of a confirmed track's whereabouts: when it was born; time, position and velocity; a quadratic
+# of the time since then that bounds its deviation; and half its acceleration.
 B_BORN, B_T, B_E, B_N, B_V_E, B_V_N, B_REACH, B_REACH_T, B_REACH_TT, B_CURVE = range(10)
 WHEREABOUTS = 10
 
