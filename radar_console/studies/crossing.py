@@ -16,7 +16,7 @@ longer than the crossing. Of each run:
 - extra: a third track was confirmed. Only counted where initiation is at work, in runs of their own with the
   same plots; elsewhere there is room for the two tracks given, so that nothing disturbs swap and loss.
 
-Initiation in 6.7 per km² is slow: a quarter of the runs. Beside: the Kalman filter; GNN with a gate of 0.99
+Beside: the Kalman filter; GNN with a gate of 0.99
 in place of 0.9999; process noise for straight courses (1 in place of 30 m²/s³). What is due to the crossing
 is seen beside the same courses moved aside, 15 km apart at the least, and meeting at 0 m. Intervals are
 Wilson's, those of differences Newcombe's for the same runs.
@@ -51,7 +51,6 @@ EVENTS = {
 _CHUNK, _CHUNK_STARTED, _CHUNK_DENSE = 20, 5, 1  # runs of a part
 _MAIN = ("GNN", "JPDA")
 _BESIDE = ("GNN, Kalman", "JPDA, Kalman", "GNN, gate 0.99", "GNN, straight", "JPDA, straight")
-_DENSE_SHARE = 4
 _PUBLISHED = {("kept", "GNN"): 0.0, ("kept", "JPDA"): 1.0, ("extra", "GNN"): 1.0, ("extra", "JPDA"): 0.0}
 
 
@@ -73,10 +72,7 @@ def plan(runs: int) -> list[tuple[Cell, tuple[str, ...], int]]:
     main = [Cell(sd, density) for sd in SIGMAS for density in DENSITIES]
     beside = {1.0, PAPER}
     given = [(cell, _MAIN + (_BESIDE if cell.density in beside else ()), runs) for cell in main]
-    few = max(runs // _DENSE_SHARE, 2)
-    started = [
-        (cell._replace(initiation=True), _MAIN, few if cell.density == PAPER else runs) for cell in main
-    ]
+    started = [(cell._replace(initiation=True), _MAIN, runs) for cell in main]
     meeting = [Cell(sd, density, where="meeting") for sd in SIGMAS for density in DENSITIES[:2]]
     apart = [Cell(sd, density, where="apart") for sd in SIGMAS for density in sorted(beside)]
     return [*given, *((cell, _MAIN, runs) for cell in (*meeting, *apart)), *started]

@@ -153,7 +153,7 @@ def serve(
 
 @bare
 def note(track: Any, books: Books) -> None:
-    """Keep where a confirmed track is where all can be looked through in one go, see `near`.
+    """Keep where a confirmed track is where all can be looked through in one go, see `may_be_near`.
 
     In T seconds its position's deviation grows by no more than T times its velocity's, and what the
     forecast adds, √(g T³), is no more than √g (T + T²) / 2.
