@@ -89,7 +89,7 @@ def sparse(miss: Array, columns: int, row: Ints, col: Ints, w: Array, budget: fl
     """
     tracks, count = len(miss), len(row)
     if not (col.flags.carray and col.dtype is _INDEX):
-        col = np.array(col, _INDEX)  # as the kernel makes it, where it makes its own
+        col = np.array(col, _INDEX)  # or all kernels are compiled for it, too
     p, p_miss, approximate = np.empty(count), np.empty(tracks), np.zeros(tracks, np.bool_)
     if len(col) != count or len(w) != count or not _sound(miss, columns, row, col, w):
         raise ValueError("expected finite weights that are not negative, and pairs in range, rows ascending")
@@ -204,15 +204,24 @@ def _solve(
     claims = np.zeros(columns, np.int64)
     for k in range(col.size):
         claims[col[k]] += 1
-    by_track, free = _shared(start, col, p, claims, budget)
+    count = 0
+    for n in claims:
+        count += n if n > 1 else 0
+    # All pairs as they are where there are no others, or so many that they are to be approximated: belief
+    # propagation needs no folding.
+    if count == col.size or _PASS * count > budget:
+        every = Side(start, col, p)
+        _clusters(every, claims, budget, approximate)
+        for t in range(miss.size):
+            p_miss[t] = _rest(p[start[t] : start[t + 1]])
+        return
+    by_track, free = _shared(start, col, p, claims, count)
     _clusters(by_track, claims, budget, approximate)
     n = 0
     for t in range(miss.size):
         rest = _rest(by_track.ratio[by_track.start[t] : by_track.start[t + 1]])
         rest /= free[t]  # of the track's miss; its own plots take their shares of it
         p_miss[t] = rest
-        if by_track.other.size == col.size:
-            continue  # `p` is the clusters' own
         for k in range(start[t], start[t + 1]):
             if claims[col[k]] == 1:
                 p[k] *= rest
@@ -231,18 +240,13 @@ def _rest(p: Array) -> float:
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _shared(start: Ints, col: Ints, ratio: Array, claims: Ints, budget: float) -> tuple[Side, Array]:
-    """The pairs whose plot several tracks gate, their ratios to a track's miss and own plots together.
+def _shared(start: Ints, col: Ints, ratio: Array, claims: Ints, count: int) -> tuple[Side, Array]:
+    """The `count` pairs of plots that several tracks gate, their ratios to a track's miss and own plots together.
 
-    All pairs as they are, where there are no others, or so many that they are to be approximated: belief
-    propagation needs no folding. Also returns that weight `free` (tracks,).
+    Also returns that weight `free` (tracks,) of miss and own plots.
     """
-    tracks, count = start.size - 1, 0
+    tracks = start.size - 1
     free = np.ones(tracks)
-    for n in claims:
-        count += n if n > 1 else 0
-    if count == col.size or _PASS * count > budget:
-        return Side(start, col, ratio), free
     # One place more: each pair is written, and overwritten by the next unless it is shared.
     begin, other, rest = np.zeros(tracks + 1, np.int64), np.empty(count + 1, np.int64), np.empty(count + 1)
     n = 0
