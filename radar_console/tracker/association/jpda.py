@@ -205,8 +205,8 @@ def _solve(
     for k in range(col.size):
         claims[col[k]] += 1
     count = 0
-    for n in claims:
-        count += n if n > 1 else 0
+    for c in range(columns):
+        count += int(claims[c]) if claims[c] > 1 else 0
     # All pairs as they are where there are no others, or so many that they are to be approximated: belief
     # propagation needs no folding.
     if count == col.size or _PASS * count > budget:
@@ -241,7 +241,7 @@ def _rest(p: Array) -> float:
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def _shared(start: Ints, col: Ints, ratio: Array, claims: Ints, count: int) -> tuple[Side, Array]:
-    """The `count` pairs of plots that several tracks gate, their ratios to a track's miss and own plots together.
+    """The `count` pairs of plots that several tracks gate, their ratios to its miss and own plots together.
 
     Also returns that weight `free` (tracks,) of miss and own plots.
     """
