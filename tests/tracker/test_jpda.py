@@ -212,6 +212,9 @@ def test_a_pair_that_is_given_twice_counts_twice():
     once = enumerate_events(np.array([[0.5, 3.0], [0.5, 1.0]]))
     assert found.p_miss == pytest.approx(once[:, 0])
     assert found.p[:2].sum() == pytest.approx(once[0, 1])
+    alone = jpda.sparse(np.array([0.5]), 1, row[:2], col[:2], w[:2])
+    assert alone.p == pytest.approx([2 / 7, 4 / 7])
+    assert not alone.approximate.any()
 
 
 @pytest.mark.parametrize(("tracks", "plots"), [(25, 25), (30, 70), (80, 26)])
@@ -227,3 +230,60 @@ def test_a_full_matrix_is_approximated_as_its_pairs_are(tracks: int, plots: int)
     np.testing.assert_allclose(found[:, 1:].ravel(), pairs.p, atol=1e-9)
     np.testing.assert_allclose(found.sum(axis=1), 1.0, atol=1e-12)
     assert found[:, 1:].sum(axis=0).max() <= 1.0 + 1e-12
+
+
+@pytest.mark.parametrize("own", [False, True])
+def test_clusters_that_are_approximated_do_not_know_of_each_other(own: bool) -> None:
+    """Many in one call, with and without plots of one track among them, are what each is alone."""
+    rng = np.random.default_rng(5)
+    many, tracks, plots = 12, 5, 6
+    single = [random_cluster(seed, tracks, plots, 1.0, 1.0) for seed in range(many)]
+    if own:
+        for one in single[::3]:
+            one[1:, 2] = 0.0
+    whole = np.zeros((many * tracks, many * plots + 1))
+    mixed = rng.permutation(many * tracks)
+    for n, one in enumerate(single):
+        rows = mixed[n * tracks : (n + 1) * tracks]
+        whole[rows, 0] = one[:, 0]
+        whole[rows, 1 + n * plots : 1 + (n + 1) * plots] = one[:, 1:]
+    found = jpda.marginals(whole, budget=0)
+    for n, one in enumerate(single):
+        rows = mixed[n * tracks : (n + 1) * tracks]
+        alone = jpda.marginals(one, budget=0)
+        np.testing.assert_allclose(found[rows, 0], alone[:, 0], atol=1e-9)
+        np.testing.assert_allclose(found[rows, 1 + n * plots : 1 + (n + 1) * plots], alone[:, 1:], atol=1e-9)
+
+
+@pytest.mark.parametrize("columns", [1, 127, 128, 129, 300])
+def test_a_dense_row_is_read_to_its_end(columns: int) -> None:
+    """Rows of all lengths about those of a block, empty blocks, weights of -0 and at both ends."""
+    likelihood = random_cluster(7, 40, columns, 0.02, 1.0)
+    likelihood[:2, 1] = likelihood[2:4, -1] = 3.0
+    likelihood[5, likelihood[5] == 0] = -0.0
+    row, col = np.nonzero(likelihood[:, 1:])
+    pairs = jpda.sparse(likelihood[:, 0].copy(), columns, row, col, likelihood[:, 1:][row, col])
+    found = jpda.marginals(likelihood)
+    assert np.array_equal(found[row, col + 1], pairs.p)
+    assert np.array_equal(found[:, 0], pairs.p_miss)
+    likelihood[-1, -1] = np.nan
+    with pytest.raises(ValueError, match="finite"):
+        jpda.marginals(likelihood)
+
+
+@pytest.mark.parametrize("shape", [(1, 40), (40, 40)])
+def test_pairs_in_arrays_of_any_kind(shape: tuple[int, int]) -> None:
+    """Views of a table and read-only arrays give what plain ones give; all stay as they were."""
+    rng = np.random.default_rng(2)
+    table = np.argwhere(rng.random(shape) < 0.2)
+    row, col, w = table[:, 0].copy(), table[:, 1].copy(), rng.gamma(1.0, size=len(table))
+    miss = np.full(shape[0], 0.1)
+    plain = jpda.sparse(miss, shape[1], row, col, w)
+    given = (row.copy(), col.copy(), w.copy())
+    for array in (miss, row, col, w):
+        array.flags.writeable = False
+    for r, c in ((table[:, 0], table[:, 1]), (row, col)):
+        found = jpda.sparse(miss, shape[1], r, c, w)
+        assert np.array_equal(found.p, plain.p)
+        assert np.array_equal(found.p_miss, plain.p_miss)
+    assert all(np.array_equal(a, b) for a, b in zip((row, col, w), given, strict=True))

@@ -60,20 +60,23 @@ def work(members: int, pairs: int) -> Work:
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def plan(members: Ints, rows: Side, columns: Side, ceiling: float, work: Work) -> tuple[float, int]:
+def plan(
+    members: Ints, rows: Side, columns: Side, ceiling: float, patience: float, work: Work
+) -> tuple[float, int, float]:
     """Fill `work.order`: next comes always the row that leaves the fewest columns live (greedily).
 
-    Returns the steps of the sum, infinite when above `ceiling`, and the numbers that it has to store.
+    Returns the steps of plan and sum, infinite when above `ceiling` or when more than `patience` went
+    into the plan; the numbers that the sum has to store; and the steps that went into the plan.
     """
     left, seen, near, order = work.left, work.seen, work.near, work.order
-    first, fewest = -1, 0
+    first, fewest, looked = -1, 0, float(members.size)
     for i in members:
         seen[i] = _NEW
         degree = rows.start[i + 1] - rows.start[i]
         if first < 0 or degree < fewest:
             first, fewest = i, degree
     if fewest > WIDEST:
-        return math.inf, 0
+        return math.inf, 0, looked
     for i in members:
         for k in range(rows.start[i], rows.start[i + 1]):
             c = rows.other[k]
@@ -89,7 +92,7 @@ def plan(members: Ints, rows: Side, columns: Side, ceiling: float, work: Work) -
                 c = rows.other[k]
                 after += left[c] == columns.start[c + 1] - columns.start[c]
                 after -= left[c] == 1
-            steps += rows.start[i + 1] - rows.start[i]  # looking costs about as much as a step
+            looked += rows.start[i + 1] - rows.start[i]  # looking costs about as much as a step
             if best < 0 or after < best_after:
                 best, best_after, at = i, after, m
         waiting -= 1
@@ -107,13 +110,13 @@ def plan(members: Ints, rows: Side, columns: Side, ceiling: float, work: Work) -
                         waiting += 1
             left[c] -= 1
         if grown > WIDEST:
-            return math.inf, 0
+            return math.inf, 0, looked
         steps += (rows.start[best + 1] - rows.start[best] + 2) * (1 << width) + (1 << grown)
-        if steps > ceiling:
-            return math.inf, 0
+        if steps + looked > ceiling or looked > patience:
+            return math.inf, 0, looked
         peak, width = max(peak, grown), best_after
         stored += 1 << width
-    return steps, stored + 3 * (1 << peak)
+    return steps + looked, stored + 3 * (1 << peak), looked
 
 
 @njit(cache=True, nogil=True, error_model="numpy")

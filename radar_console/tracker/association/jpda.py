@@ -20,17 +20,25 @@ from radar_console.tracker.association import elimination, pairs, propagation
 from radar_console.tracker.association.pairs import Ints, Side
 
 BUDGET = 8.0e6
-"""Steps of the exact sums of one call (about 1 ns each), beyond which clusters are approximated."""
+"""Steps of one call, about 1 ns each, beyond which clusters are approximated.
+
+Counted are the exact sums, the search for their order, and something for each pair, so that the time of a
+call has a bound: half a million pairs whose plots are shared take it all.
+"""
 
 _SWEEPS = 200
 _MESSAGES = 2.0e6  # of a call's belief propagation, about 3 ns each
-_BLOCK = 64  # weights of a dense row that are looked at together; less than 256
+_SPOKEN = 8.0  # messages that each track takes besides those of its pairs
+_BLOCK = 128  # weights of a dense row that are looked at together; less than 256
+_INDEX = np.dtype(np.int64)
+_CHECKED = 512  # pairs that are checked together
+_PASS, _TRACK, _LOOK = 16.0, 30.0, 3.0  # steps that a pair, a track and a look in a plan take besides
 _CHEAP = 256.0  # steps for which it is not worth while to look for a cheaper way
 
-_ratios, find = pairs.ratios, pairs.find
+_starts, _divide, find = pairs.starts, pairs.divide, pairs.find
 _work, _plan, _eliminate = elimination.work, elimination.plan, elimination.eliminate
 _WIDEST = elimination.WIDEST
-_propagate, _propagate_all = propagation.propagate, propagation.propagate_all
+_messages, _propagate, _propagate_all = propagation.messages, propagation.propagate, propagation.propagate_all
 
 
 class Marginals(NamedTuple):
@@ -80,6 +88,8 @@ def sparse(miss: Array, columns: int, row: Ints, col: Ints, w: Array, budget: fl
     ValueError      a weight is negative or not finite, or a pair is out of range or order
     """
     tracks, count = len(miss), len(row)
+    if not (col.flags.carray and col.dtype is _INDEX):
+        col = np.array(col, _INDEX)  # or all kernels are compiled for it, too
     p, p_miss, approximate = np.empty(count), np.empty(tracks), np.zeros(tracks, np.bool_)
     if len(col) != count or len(w) != count or not _sound(miss, columns, row, col, w):
         raise ValueError("expected finite weights that are not negative, and pairs in range, rows ascending")
@@ -89,14 +99,19 @@ def sparse(miss: Array, columns: int, row: Ints, col: Ints, w: Array, budget: fl
 
 @njit(cache=True, nogil=True)
 def _sound(miss: Array, columns: int, row: Ints, col: Ints, w: Array) -> bool:
-    before = 0
+    if row.size > 0 and not (0 <= row[0] and row[-1] < miss.size):
+        return False
     for t in range(miss.size):
         if not 0.0 <= miss[t] < math.inf:
             return False
-    for k in range(row.size):
-        if not (before <= row[k] < miss.size and 0 <= col[k] < columns and 0.0 <= w[k] < math.inf):
+    for begin in range(0, row.size, _CHECKED):
+        end, good = min(begin + _CHECKED, row.size), 0
+        for k in range(begin, end):  # without a branch, in vectors
+            good += (0 <= col[k]) & (col[k] < columns) & (w[k] >= 0.0) & (w[k] < math.inf)
+        for k in range(max(begin, 1), end):
+            good -= row[k - 1] > row[k]
+        if good < end - begin:
             return False
-        before = row[k]
     return True
 
 
@@ -105,40 +120,46 @@ def _dense(weights: Array, budget: float, result: Array) -> bool:
     """Fill `result`; False if a weight is not sound."""
     tracks, columns = weights.shape
     blocks = (columns - 1 + _BLOCK - 1) // _BLOCK
-    some, pairs = np.empty((tracks, blocks), np.uint8), 0
+    bits = weights.view(np.uint64)
+    some, pairs = np.zeros((tracks, blocks), np.uint8), 0
     for t in range(tracks):
-        gate = weights[t, 1:]
+        if not 0.0 <= weights[t, 0] < math.inf:
+            return False
         for b in range(blocks):
-            block, count, sound = gate[b * _BLOCK : (b + 1) * _BLOCK], 0, 0
-            for j in range(block.size):  # without a branch: as fast as memory delivers
+            begin, end = 1 + b * _BLOCK, min(1 + (b + 1) * _BLOCK, columns)
+            whole, any_bit = bits[t, begin:end], np.uint64(0)
+            for j in range(whole.size):  # as fast as memory delivers
+                any_bit |= whole[j]
+            if any_bit == 0:
+                continue
+            block, count, sound = weights[t, begin:end], 0, 0
+            for j in range(block.size):
                 count += block[j] != 0.0
                 sound += (block[j] >= 0.0) & (block[j] < math.inf)
             if sound < block.size:
                 return False
             some[t, b] = count
             pairs += count
-        if not 0.0 <= weights[t, 0] < math.inf:
-            return False
     if pairs == tracks * (columns - 1) and min(tracks, columns - 1) > _WIDEST:
-        _propagate_all(weights, _sweeps(pairs), result)
+        _propagate_all(weights, _sweeps(pairs, tracks), result)
         return True
-    row, col, w = np.empty(pairs, np.int64), np.empty(pairs, np.int64), np.empty(pairs)
-    miss, n = weights[:, 0].copy(), 0
+    start, col, p = np.zeros(tracks + 1, np.int64), np.empty(pairs, np.int64), np.empty(pairs)
+    n = 0
     for t in range(tracks):
         for b in range(blocks):
-            if some[t, b] == 0:
-                continue
-            block = weights[t, 1 + b * _BLOCK : 1 + (b + 1) * _BLOCK]
-            for j in range(block.size):
-                if block[j] != 0.0:
-                    row[n], col[n], w[n] = t, b * _BLOCK + j, block[j]
-                    n += 1
-    p, p_miss, approximate = np.empty(n), np.empty(tracks), np.zeros(tracks, np.bool_)
-    solve(miss, columns - 1, row, col, w, budget, p, p_miss, approximate)
+            block = weights[t, 1 + b * _BLOCK : min(1 + (b + 1) * _BLOCK, columns)]
+            last, j = n + some[t, b], 0
+            while n < last:  # each weight is written, and overwritten by the next unless it counts
+                col[n], p[n] = b * _BLOCK + j, block[j]
+                n += block[j] != 0.0
+                j += 1
+        start[t + 1] = n
+    p_miss, approximate = np.empty(tracks), np.zeros(tracks, np.bool_)
+    _solve(weights[:, 0].copy(), columns - 1, start, col, p, budget, p, p_miss, approximate)
     for t in range(tracks):
         result[t, 0] = p_miss[t]
-    for k in range(n):
-        result[row[k], col[k] + 1] = p[k]
+        for k in range(start[t], start[t + 1]):
+            result[t, col[k] + 1] = p[k]
     return True
 
 
@@ -159,56 +180,86 @@ def solve(
     Fills `p` (pairs,), `p_miss` (tracks,) and `approximate` (tracks,) for the tracks whose cluster
     was past what was left of the budget.
     """
-    tracks = miss.size
+    _solve(miss, columns, _starts(miss.size, row), col, w, budget, p, p_miss, approximate)
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _solve(
+    miss: Array,
+    columns: int,
+    start: Ints,
+    col: Ints,
+    w: Array,
+    budget: float,
+    p: Array,
+    p_miss: Array,
+    approximate: Any,
+) -> None:
+    """`solve` for pairs start[t]:start[t + 1] of each track t; `p` may be `w`.
+
+    Up to a million pairs, fresh memory and another pass cost as much as a sweep: hence what is done in place.
+    """
     approximate[:] = False
-    ratio = _ratios(miss, row, w)
+    _divide(miss, start, w, p)
     claims = np.zeros(columns, np.int64)
-    for k in range(row.size):
+    for k in range(col.size):
         claims[col[k]] += 1
-    by_track, free = _shared(tracks, row, col, ratio, claims, p)
+    count = 0
+    for c in range(columns):
+        count += int(claims[c]) if claims[c] > 1 else 0
+    # All pairs as they are where there are no others, or so many that they are to be approximated: belief
+    # propagation needs no folding.
+    if count == col.size or _PASS * count > budget:
+        every = Side(start, col, p)
+        _clusters(every, claims, budget, approximate)
+        for t in range(miss.size):
+            p_miss[t] = _rest(p[start[t] : start[t + 1]])
+        return
+    by_track, free = _shared(start, col, p, claims, count)
     _clusters(by_track, claims, budget, approximate)
-    n, k = 0, 0
-    for t in range(tracks):
-        rest = 1.0
-        for m in range(by_track.start[t], by_track.start[t + 1]):
-            rest -= by_track.ratio[m]
-        rest = max(rest, 0.0) / free[t]  # of the track's miss; its own plots take their shares of it
+    n = 0
+    for t in range(miss.size):
+        rest = _rest(by_track.ratio[by_track.start[t] : by_track.start[t + 1]])
+        rest /= free[t]  # of the track's miss; its own plots take their shares of it
         p_miss[t] = rest
-        while k < row.size and row[k] == t:
+        for k in range(start[t], start[t + 1]):
             if claims[col[k]] == 1:
                 p[k] *= rest
             else:
                 p[k] = by_track.ratio[n]
                 n += 1
-            k += 1
+
+
+@njit(cache=True, nogil=True, fastmath={"reassoc", "nsz"})
+def _rest(p: Array) -> float:
+    """Of the probability, what a track's pairs leave."""
+    total = 0.0
+    for k in range(p.size):
+        total += p[k]
+    return max(1.0 - total, 0.0)
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _shared(tracks: int, row: Ints, col: Ints, ratio: Array, claims: Ints, own: Array) -> tuple[Side, Array]:
-    """The pairs whose plot several tracks gate, their ratios to a track's miss and own plots together.
+def _shared(start: Ints, col: Ints, ratio: Array, claims: Ints, count: int) -> tuple[Side, Array]:
+    """The `count` pairs of plots that several tracks gate, their ratios to its miss and own plots together.
 
-    Moves them to the front of `ratio`, and copies the others to their places in `own`: on large problems
-    fresh memory costs more than the sums. Also returns that weight `free` (tracks,) of miss and own plots.
+    Also returns that weight `free` (tracks,) of miss and own plots.
     """
+    tracks = start.size - 1
     free = np.ones(tracks)
-    count = 0
-    for k in range(row.size):
-        if claims[col[k]] == 1:
-            free[row[k]] += ratio[k]
-        else:
-            count += 1
-    start, other = np.zeros(tracks + 1, np.int64), np.empty(count, np.int64)
-    n, k = 0, 0
+    # One place more: each pair is written, and overwritten by the next unless it is shared.
+    begin, other, rest = np.zeros(tracks + 1, np.int64), np.empty(count + 1, np.int64), np.empty(count + 1)
+    n = 0
     for t in range(tracks):
-        while k < row.size and row[k] == t:
-            if claims[col[k]] == 1:
-                own[k] = ratio[k]
-            else:
-                other[n], ratio[n] = col[k], ratio[k] / free[t]
-                n += 1
-            k += 1
-        start[t + 1] = n
-    return Side(start, other, ratio[:count]), free
+        for k in range(start[t], start[t + 1]):
+            own = claims[col[k]] == 1
+            other[n], rest[n] = col[k], ratio[k]
+            n += not own
+            free[t] += ratio[k] if own else 0.0
+        begin[t + 1] = n
+        for k in range(begin[t], n):
+            rest[k] /= free[t]
+    return Side(begin, other[:count], rest[:count]), free
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -268,27 +319,36 @@ def _clusters(by_track: Side, claims: Ints, budget: float, approximate: Any) -> 
     if pairs == 0:
         return
     members, begin = _components(by_track, columns)
-    left, sweeps = budget, _sweeps(pairs)
+    left, sweeps = budget - _PASS * pairs, _sweeps(pairs, members.size)
     if _too_wide(by_track, claims):
         left = 0.0
     by_plot, place = _by_plot(by_track, columns if left > 0.0 else 0)
     work, work2 = _work(max(tracks, columns), pairs), _work(max(tracks, columns), pairs)
     plots, listed = np.empty(columns, np.int64), np.zeros(columns, np.bool_)
-    store = np.empty(1024)
+    store, scratch = np.empty(1024), _messages(by_track, 0)
     for g in range(begin.size - 1):
         group = members[begin[g] : begin[g + 1]]
-        cost, cost2, room, room2, n = math.inf, math.inf, 0, 0, 0
+        if group.size == 1:
+            alone = by_track.ratio[by_track.start[group[0]] : by_track.start[group[0] + 1]]
+            alone /= 1.0 + alone.sum()
+            continue
+        n = _list_plots(group, by_track, listed, plots)
+        cost, cost2, room, room2, spent = math.inf, math.inf, 0, 0, 0.0
         if left > 0.0:
-            n = _list_plots(group, by_track, listed, plots)
-            cost, room = _plan(group, by_track, by_plot, left, work)
+            patience = 0.5 * left / _LOOK
+            cost, room, looked = _plan(group, by_track, by_plot, left, patience, work)
             if cost > _CHEAP:
-                cost2, room2 = _plan(plots[:n], by_plot, by_track, min(left, cost), work2)
+                cost2, room2, looked2 = _plan(plots[:n], by_plot, by_track, min(left, cost), patience, work2)
+            spent = _TRACK * group.size + _LOOK * (looked + looked2)
         if min(cost, cost2) > left:
-            _propagate(group, by_track, columns, sweeps)
+            left -= spent
+            if scratch.heard.size == 0:
+                scratch = _messages(by_track, columns)
+            _propagate(group, by_track, plots[:n], sweeps, scratch)
             for t in group:
                 approximate[t] = True
             continue
-        left -= min(cost, cost2)
+        left -= spent + min(cost, cost2)
         if max(room, room2) > store.size:
             store = np.empty(max(room, room2))
         if cost <= cost2:
@@ -301,9 +361,9 @@ def _clusters(by_track: Side, claims: Ints, budget: float, approximate: Any) -> 
 
 
 @njit(cache=True, nogil=True)
-def _sweeps(pairs: int) -> int:
+def _sweeps(pairs: int, tracks: int) -> int:
     """How often belief propagation may go over so many pairs."""
-    return min(_SWEEPS, max(int(_MESSAGES / pairs), 1))
+    return min(_SWEEPS, max(round(_MESSAGES / (pairs + _SPOKEN * tracks)), 1))
 
 
 @njit(cache=True, nogil=True)

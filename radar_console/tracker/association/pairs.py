@@ -19,6 +19,9 @@ LEAST_MISS = 1e-30
 """Of a track's largest weight: keeps a certain detection (P_D P_G = 1, a miss of weight 0) divisible."""
 
 
+_LEAP = 32  # pairs of one track that are passed over at once
+
+
 class Side(NamedTuple):
     """The pairs by one side, tracks or plots.
 
@@ -34,24 +37,43 @@ class Side(NamedTuple):
     ratio: Array
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
-def ratios(miss: Array, row: Ints, w: Array) -> Array:
-    """(pairs,) weight over the track's miss weight; at most 1 / LEAST_MISS."""
-    ratio = np.empty(row.size)
-    end = 0
-    while end < row.size:
-        begin, track = end, row[end]
-        largest = miss[track]
-        while end < row.size and row[end] == track:
-            largest = max(largest, w[end])
-            end += 1
-        if largest == 0.0:
-            ratio[begin:end] = 0.0
-            continue
-        least = max(miss[track] / largest, LEAST_MISS)
-        gate, r = w[begin:end], ratio[begin:end]
+@njit(cache=True, nogil=True)
+def starts(tracks: int, row: Ints) -> Ints:
+    """(tracks + 1,) the pairs of track t are starts[t]:starts[t + 1]."""
+    start = np.empty(tracks + 1, np.int64)
+    k = 0
+    for t in range(tracks):
+        start[t] = k
+        while k + _LEAP < row.size and row[k + _LEAP] == t:
+            k += _LEAP
+        while k < row.size and row[k] == t:
+            k += 1
+    start[tracks] = k
+    return start
+
+
+# No weight is NaN, and the largest is the same in any order: so it is looked for in vectors.
+@njit(cache=True, nogil=True, error_model="numpy", fastmath={"nnan", "nsz", "reassoc"})
+def divide(miss: Array, start: Ints, w: Array, ratio: Array) -> None:
+    """Fill `ratio` (pairs,) with weight over the track's miss weight, at most 1 / LEAST_MISS; may be `w`."""
+    for t in range(miss.size):
+        gate, r = w[start[t] : start[t + 1]], ratio[start[t] : start[t + 1]]
+        largest = miss[t]
         for k in range(r.size):
-            r[k] = gate[k] / largest / least  # two quotients: no overflow, no 0 / 0 below 1e-308
+            r[k] = gate[k]
+            largest = max(largest, r[k])
+        if largest == 0.0:
+            continue
+        least = max(miss[t] / largest, LEAST_MISS)
+        for k in range(r.size):
+            r[k] = r[k] / largest / least  # two quotients: no overflow, no 0 / 0 below 1e-308
+
+
+@njit(cache=True, nogil=True)
+def ratios(miss: Array, row: Ints, w: Array) -> Array:
+    """(pairs,) the same, in an array of its own."""
+    ratio = np.empty(row.size)
+    divide(miss, starts(miss.size, row), w, ratio)
     return ratio
 
 
