@@ -28,6 +28,7 @@ from radar_console.tracker.records import (
     World,
 )
 
+_SET_JPDA = choose.SET_JPDA
 _find, _solve, _BUDGET = jpda.find, choose.associate, jpda.BUDGET
 _advance, _log_likelihood, _update = filters.advance, filters.log_likelihood, filters.update
 _density_at, _MARGIN = clutter.density_at, gating.MARGIN
@@ -192,6 +193,11 @@ def _associate(lo: int, hi: int, w: World) -> None:
     beta, beta_miss, rough = np.zeros(n), np.ones(m), np.zeros(m, np.bool_)
     _solve(par.associator, miss, plots, row[:n], col[:n], weight[:n], _BUDGET, beta, beta_miss, rough)
     _cap(col, plots, kept, w, beta)
+    claims = np.zeros(plots, np.int64)
+    for k in range(n):
+        claims[col[k]] += 1
+    for i in range(m):
+        tracks[w.members[lo + i].track].crowded = False
     total = miss
     for k in range(n):
         i = row[k]
@@ -203,6 +209,8 @@ def _associate(lo: int, hi: int, w: World) -> None:
             w.pairs[place] = pair
             pair = w.pairs[place]
         pair.beta = beta[k]
+        if par.associator == _SET_JPDA and claims[col[k]] > 1:
+            tracks[member.track].crowded = True
         member.kept += 1
         member.used += beta[k]
         if tracks[member.track].swept:

@@ -60,6 +60,7 @@ STATE = np.dtype(
         ("proven", "?"),  # to be confirmed when all who claim its last plot are served
         ("probability", "f8"),  # of that plot
         ("claims", "?"),  # it has plots in its gate
+        ("crowded", "?"),  # set JPDA: another confirmed track claims one of its plots, too
         ("swept", "?"),
         ("served", "?"),  # in this bin
         ("dead", "?"),

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numba import njit
 
-from radar_console.tracker import clusters, clutter, gating, management, order, youth
+from radar_console.tracker import clusters, clutter, gating, labels, management, order, youth
 from radar_console.tracker.records import (
     N_EDGES,
     N_MEMBERS,
@@ -37,6 +37,7 @@ _serve_members, _settle_young, _retire, _purge = (
     youth.retire,
     youth.purge,
 )
+_relabel = labels.relabel
 _bury, _turn_to = management.bury, clutter.turn_to
 _survey, _forget = clutter.survey, clutter.forget
 _ascending = order.ascending
@@ -82,7 +83,8 @@ def open_bin(beam: Any, queue: Any, w: World, final: bool) -> bool:
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def close_bin(beam: Any, w: World, final: bool) -> None:
-    """Serve confirmed and young tracks, let plots go, bury the dead."""
+    """Let tracks exchange particles, serve confirmed and young ones, let plots go, bury the dead."""
+    _relabel(w)
     _serve_members(beam, w)
     _settle_young(beam, w, final)
     _retire(beam, w)

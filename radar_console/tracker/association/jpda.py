@@ -165,7 +165,7 @@ def solve(
     claims = np.zeros(columns, np.int64)
     for k in range(row.size):
         claims[col[k]] += 1
-    by_track, free = _shared(tracks, row, col, ratio, claims, p)
+    by_track, free = shared(tracks, row, col, ratio, claims, p)
     _clusters(by_track, claims, budget, approximate)
     n, k = 0, 0
     for t in range(tracks):
@@ -184,7 +184,7 @@ def solve(
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _shared(tracks: int, row: Ints, col: Ints, ratio: Array, claims: Ints, own: Array) -> tuple[Side, Array]:
+def shared(tracks: int, row: Ints, col: Ints, ratio: Array, claims: Ints, own: Array) -> tuple[Side, Array]:
     """The pairs whose plot several tracks gate, their ratios to a track's miss and own plots together.
 
     Moves them to the front of `ratio`, and copies the others to their places in `own`: on large problems
@@ -212,7 +212,7 @@ def _shared(tracks: int, row: Ints, col: Ints, ratio: Array, claims: Ints, own: 
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _by_plot(by_track: Side, columns: int) -> tuple[Side, Ints]:
+def arranged(by_track: Side, columns: int) -> tuple[Side, Ints]:
     """The same pairs by plot, and the place of each by track; of no `columns`, none."""
     pairs = by_track.other.size if columns > 0 else 0
     start = np.zeros(columns + 1, np.int64)
@@ -231,7 +231,7 @@ def _by_plot(by_track: Side, columns: int) -> tuple[Side, Ints]:
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _components(by_track: Side, columns: int) -> tuple[Ints, Ints]:
+def components(by_track: Side, columns: int) -> tuple[Ints, Ints]:
     """Tracks that share plots, one component after the other, and where each begins."""
     tracks = by_track.start.size - 1
     parent, claimant = np.arange(tracks), np.full(columns, -1, np.int64)
@@ -267,11 +267,11 @@ def _clusters(by_track: Side, claims: Ints, budget: float, approximate: Any) -> 
     pairs, tracks, columns = by_track.other.size, by_track.start.size - 1, claims.size
     if pairs == 0:
         return
-    members, begin = _components(by_track, columns)
+    members, begin = components(by_track, columns)
     left, sweeps = budget, _sweeps(pairs)
     if _too_wide(by_track, claims):
         left = 0.0
-    by_plot, place = _by_plot(by_track, columns if left > 0.0 else 0)
+    by_plot, place = arranged(by_track, columns if left > 0.0 else 0)
     work, work2 = _work(max(tracks, columns), pairs), _work(max(tracks, columns), pairs)
     plots, listed = np.empty(columns, np.int64), np.zeros(columns, np.bool_)
     store = np.empty(1024)
