@@ -135,9 +135,9 @@ def _place(choice: Places, first: int, kept: int, lot: Singles) -> None:
         begin[choice[a] + 1] += 1
     for j in range(kept + 1):
         begin[j + 1] += begin[j]
-    for a in shuffled:
-        alternative = choice[a]
-        choice[a] = begin[alternative]
+    for event in shuffled:
+        alternative = choice[event]
+        choice[event] = begin[alternative]
         begin[alternative] += 1
 
 
