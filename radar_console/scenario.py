@@ -319,7 +319,13 @@ class TrackerSettings(Settings):
         Literal["filter", "gaussian"],
         Field(description="what associates: the filter's own likelihood, or a Gaussian from its moments"),
     ] = "filter"
-    associator: Literal["jpda", "gnn", "nn", "pda"] = "jpda"
+    associator: Annotated[
+        Literal["jpda", "set-jpda", "gnn", "nn", "pda"],
+        Field(
+            description="set-jpda: adapted particles change between tracks that share plots, so that each is "
+            "at one place; for formations, not for who is who; other filters have jpda's"
+        ),
+    ] = "jpda"
     gate: Annotated[
         Literal["ellipse", "rectangle"], Field(description="rectangle: along and across the line of sight")
     ] = "ellipse"

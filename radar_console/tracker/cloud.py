@@ -69,7 +69,7 @@ def start(track: Any, sensor_e: float, sensor_n: float, par: Any, belief: Belief
     model[:] = 0
     if not _plain(par):
         _begin_manoeuvres(particles, model, _mix(key), par)
-    _take_moments(track, par, belief)
+    take_moments(track, par, belief)
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -201,14 +201,15 @@ def update(
     if par.proposal == PRIOR:
         _sum_alternatives(terms, weights)
         effective = _normalise(weights)
-        _take_moments(track, par, belief)
+        take_moments(track, par, belief)
         if effective < par.resample_below * weights.size:
             _resample_cloud(track, key, par, belief)
     else:
         effective = _effective(terms, everything) if par.proposal == ADAPTED else math.inf
         _propose_cloud(track, terms, everything, chosen, pool, key, par, belief)
-        _take_moments(track, par, belief)
-        if effective < par.resample_below * weights.size:
+        take_moments(track, par, belief)
+        # The shape of a cloud that is here or there, as those in a crowd often are, is too wide for a kernel.
+        if effective < par.resample_below * weights.size and not track.crowded:
             _part_copies(track, key, belief)
 
 
@@ -427,7 +428,7 @@ def _choose_pairs(
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _take_moments(track: Any, par: Any, belief: Belief) -> None:
+def take_moments(track: Any, par: Any, belief: Belief) -> None:
     """The track's moments and forecast; the anchor becomes the mean."""
     slot, x, anchor, P = track.slot, track.x, track.anchor, track.P
     particles, weights, S = belief.particles[slot], belief.weights[slot], belief.P[slot, 0]
@@ -519,4 +520,4 @@ def _turn(P: Array, c: float, s: float, out: Array) -> None:
             out[k, i] = out[i, k]
 
 
-__all__ = ["OPEN", "advance", "log_likelihood", "rows", "start", "update"]
+__all__ = ["OPEN", "advance", "log_likelihood", "rows", "start", "take_moments", "update"]

@@ -29,7 +29,7 @@ from radar_console.tracker.records import (
 )
 
 _find, _solve, _BUDGET = jpda.find, choose.associate, jpda.BUDGET
-_PDA, _JPDA = choose.PDA, choose.JPDA
+_PDA, _JPDA, _SET_JPDA = choose.PDA, choose.JPDA, choose.SET_JPDA
 _advance, _log_likelihood, _update = filters.advance, filters.log_likelihood, filters.update
 _density_at, _MARGIN = clutter.density_at, gating.MARGIN
 _height_factor, _update_height, _identity_factor = height.factor, height.update, identity.factor
@@ -158,7 +158,7 @@ def associate(w: World) -> None:
         hi = lo + 1
         while hi < stop and w.members[hi].cluster == w.members[lo].cluster:
             hi += 1
-        if hi == lo + 1 and (w.par.associator == _PDA or w.par.associator == _JPDA):
+        if hi == lo + 1 and (w.par.associator in (_PDA, _JPDA, _SET_JPDA)):
             _associate_alone(lo, w)
         else:
             _associate(lo, hi, w)
@@ -173,7 +173,7 @@ def _associate_alone(m: int, w: World) -> None:
     if m + 1 < size[N_MEMBERS]:
         end = w.members[m + 1].pairs
     miss = 1.0 - par.p_d * par.p_g
-    total = miss
+    total, track.crowded = miss, False
     for k in range(begin, end):
         pair = w.pairs[k]
         pair.w *= _relative_to_clutter(track, pool[pair.plot], par)
@@ -238,6 +238,11 @@ def _associate(lo: int, hi: int, w: World) -> None:
     beta, beta_miss, rough = np.zeros(n), np.ones(m), np.zeros(m, np.bool_)
     _solve(par.associator, miss, plots, row[:n], col[:n], weight[:n], _BUDGET, beta, beta_miss, rough)
     _cap(col, plots, kept, w, beta)
+    claims = np.zeros(plots, np.int64)
+    for k in range(n):
+        claims[col[k]] += 1
+    for i in range(m):
+        tracks[w.members[lo + i].track].crowded = False
     total = miss
     for k in range(n):
         i = row[k]
@@ -246,6 +251,8 @@ def _associate(lo: int, hi: int, w: World) -> None:
         pair = w.pairs[member.pairs + member.kept]
         _keep_pair(kept[k], member, w)
         pair.beta = beta[k]
+        if par.associator == _SET_JPDA and claims[col[k]] > 1:
+            tracks[member.track].crowded = True
         member.used += beta[k]
         if tracks[member.track].swept:
             pool[pair.plot].weight = max(pool[pair.plot].weight - beta[k], 0.0)

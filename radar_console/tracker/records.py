@@ -33,6 +33,7 @@ STATE = np.dtype(
         ("level", "i8"),
         ("dense", "?"),  # it was born in dense clutter
         ("claims", "?"),  # it has plots in its gate
+        ("crowded", "?"),  # set JPDA: another confirmed track claims one of its plots, too
         ("swept", "?"),
         ("served", "?"),  # in this bin
         ("dead", "?"),

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from radar_console.tracker import clusters, clutter, gating, management, order, youth
+from radar_console.tracker import clusters, clutter, gating, labels, management, order, youth
 from radar_console.tracker.kernels import bare, inlined, owning
 from radar_console.tracker.records import (
     N_EDGES,
@@ -37,6 +37,7 @@ _serve_members, _settle_young, _retire, _purge = (
     youth.retire,
     youth.purge,
 )
+_relabel = labels.relabel
 _bury, _turn_to = management.bury, clutter.turn_to
 _survey, _forget = clutter.survey, clutter.forget
 _ascending = order.ascending
@@ -83,7 +84,8 @@ def open_bin(beam: Any, queue: Any, w: World, final: bool) -> bool:
 
 @bare
 def close_bin(beam: Any, w: World, final: bool) -> None:
-    """Serve confirmed and young tracks, let plots go, bury the dead."""
+    """Let tracks exchange particles, serve confirmed and young ones, let plots go, bury the dead."""
+    _relabel(w)
     _serve_members(beam, w)
     _settle_young(beam, w, final)
     _retire(beam, w)

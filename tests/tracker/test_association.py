@@ -11,7 +11,7 @@ from scipy.sparse import csr_array
 from scipy.sparse.csgraph import min_weight_full_bipartite_matching
 
 from radar_console.tracker.association import gnn, jpda
-from radar_console.tracker.association.choose import GNN, JPDA, KINDS, NN, PDA, associate
+from radar_console.tracker.association.choose import GNN, JPDA, KINDS, NN, PDA, SET_JPDA, associate
 
 every_kind = pytest.mark.parametrize("kind", KINDS.values(), ids=KINDS.keys())
 many = settings(max_examples=50, derandomize=True)
@@ -130,6 +130,7 @@ def test_certain_detection_leaves_nobody_out(kind):
         GNN: [[0, 0, 1], [0, 1, 0]],
         PDA: [[0, 5 / 6, 1 / 6], [0, 1, 0]],
         JPDA: [[0, 0, 1], [0, 1, 0]],
+        SET_JPDA: [[0, 0, 1], [0, 1, 0]],
     }
     assert found == pytest.approx(np.array(expected[kind]), abs=1e-12)
 
@@ -167,7 +168,7 @@ def test_scale_of_all_weights_does_not_matter(kind, weight):
     assert found == pytest.approx(solved(kind, np.ones((3, 3))), abs=1e-12)
 
 
-@pytest.mark.parametrize("kind", [PDA, JPDA])
+@pytest.mark.parametrize("kind", [PDA, JPDA, SET_JPDA])
 @many
 @given(problem=problems())
 def test_equal_plots_and_equal_tracks_share_alike(kind, problem):

@@ -246,7 +246,7 @@ def test_detection_that_is_certain_or_impossible(name, p_d, initiation):
     assert counts.lost == counts.confirmed
 
 
-@pytest.mark.parametrize("associator", ["jpda", "pda", "gnn", "nn"])
+@pytest.mark.parametrize("associator", ["jpda", "set-jpda", "pda", "gnn", "nn"])
 @pytest.mark.parametrize("p_d", [1e-12, 1.0])
 def test_certain_detection_and_shared_plots(associator, p_d):
     targets = np.array([(30e3, 30e3 + 300.0 * k, 50.0, 5.0 * k) for k in range(4)])

@@ -176,7 +176,7 @@ def test_after_its_service_a_track_is_a_turn_away():
     assert waiting > 100
 
 
-@pytest.mark.parametrize("associator", ["jpda", "pda", "gnn", "nn"])
+@pytest.mark.parametrize("associator", ["jpda", "set-jpda", "pda", "gnn", "nn"])
 def test_no_plot_is_used_for_more_than_one(monkeypatch, associator):
     """Law 5, over all the clusters that a plot has been in, forced closes included."""
     used = Counter()

@@ -19,7 +19,7 @@ def holds_all(rows, counts, scene, count):
     assert sorted(target_of(rows, scene, track) for track in held(rows)) == list(range(count))
 
 
-@pytest.mark.parametrize("associator", ["nn", "gnn", "pda", "jpda"])
+@pytest.mark.parametrize("associator", ["nn", "gnn", "pda", "jpda", "set-jpda"])
 @pytest.mark.parametrize("gate", ["ellipse", "rectangle"])
 @pytest.mark.parametrize("likelihood", ["filter", "gaussian"])
 def test_every_associator_and_gate_holds_a_simple_scene(calm, associator, gate, likelihood):
@@ -28,7 +28,7 @@ def test_every_associator_and_gate_holds_a_simple_scene(calm, associator, gate, 
 
 
 @pytest.mark.parametrize("name", FILTERS)
-@pytest.mark.parametrize("associator", ["gnn", "jpda"])
+@pytest.mark.parametrize("associator", ["gnn", "jpda", "set-jpda"])
 def test_every_filter_holds_two_that_fly_side_by_side(name, associator):
     targets = np.array([(-10e3, 60e3, 150.0, 0.0), (-10e3, 61.5e3, 150.0, 0.0)])
     scene = Scene(targets, turns=25, p_d=0.95)

@@ -8,8 +8,8 @@ from radar_console.estimation.gaussian import Array
 from radar_console.tracker.association import gnn, jpda, nearest, pda
 from radar_console.tracker.association.pairs import Ints
 
-NN, GNN, PDA, JPDA = range(4)
-KINDS = {"nn": NN, "gnn": GNN, "pda": PDA, "jpda": JPDA}
+NN, GNN, PDA, JPDA, SET_JPDA = range(5)
+KINDS = {"nn": NN, "gnn": GNN, "pda": PDA, "jpda": JPDA, "set-jpda": SET_JPDA}
 """By the name that `[tracker] associator` gives."""
 
 _nearest, _gnn, _pda, _jpda = nearest.solve, gnn.solve, pda.solve, jpda.solve
@@ -32,7 +32,7 @@ def associate(
 
     Parameters
     ----------
-    kind : NN, GNN, PDA or JPDA
+    kind : NN, GNN, PDA, JPDA, or SET_JPDA, which has the same probabilities
     miss : (tracks,)   weight of no plot, 1 - P_D P_G
     columns : number of plots
     row, col : (pairs,)   track, ascending, and plot of each pair inside a gate
@@ -42,7 +42,7 @@ def associate(
     p_miss : (tracks,)   filled with that of no plot
     approximate : (tracks,) bool   filled: the budget did not suffice for the track's cluster
     """
-    if kind == JPDA:
+    if kind in (JPDA, SET_JPDA):
         _jpda(miss, columns, row, col, w, budget, p, p_miss, approximate)
     elif kind == PDA:
         _pda(miss, columns, row, col, w, budget, p, p_miss, approximate)

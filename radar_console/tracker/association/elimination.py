@@ -154,12 +154,16 @@ def _lay_out(rows_count: int, rows: Side, columns: Side, work: Work) -> int:
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def eliminate(rows_count: int, rows: Side, columns: Side, work: Work, store: Array) -> None:
-    """Turn the ratios of the rows of `work.order` into probabilities; `store` is as large as `plan` said."""
-    peak = _lay_out(rows_count, rows, columns, work)
-    ahead, behind = store[: 1 << peak], store[1 << peak : 2 << peak]
-    tables = store[2 << peak :]
+def add_up(rows_count: int, rows: Side, columns: Side, work: Work, store: Array) -> Array:
+    """The sums before each row of `work.order`, one table after the other, each up to a factor."""
+    tables = store[2 << _lay_out(rows_count, rows, columns, work) :]
+    _sum_forward(rows_count, rows, work, tables)
+    return tables
 
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _sum_forward(rows_count: int, rows: Side, work: Work, tables: Array) -> int:
+    """Fill `tables` with the sums before each row, and where the last one, of all rows, begins."""
     tables[0] = 1.0
     begin, scale = 0, 1.0
     for n in range(rows_count):
@@ -178,6 +182,16 @@ def eliminate(rows_count: int, rows: Side, columns: Side, work: Work, store: Arr
             grown >>= 1
             _sum_out(then, grown, work.ended[e])
         scale = 1.0 / _total(then, grown)
+    return begin
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def eliminate(rows_count: int, rows: Side, columns: Side, work: Work, store: Array) -> None:
+    """Turn the ratios of the rows of `work.order` into probabilities; `store` is as large as `plan` said."""
+    peak = _lay_out(rows_count, rows, columns, work)
+    ahead, behind = store[: 1 << peak], store[1 << peak : 2 << peak]
+    tables = store[2 << peak :]
+    begin = _sum_forward(rows_count, rows, work, tables)
 
     ahead[0] = 1.0
     grown = 1

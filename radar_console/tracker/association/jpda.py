@@ -215,7 +215,7 @@ def _solve(
         for t in range(miss.size):
             p_miss[t] = _rest(p[start[t] : start[t + 1]])
         return
-    by_track, free = _shared(start, col, p, claims, count)
+    by_track, free = shared(start, col, p, claims, count)
     _clusters(by_track, claims, budget, approximate)
     n = 0
     for t in range(miss.size):
@@ -240,7 +240,7 @@ def _rest(p: Array) -> float:
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _shared(start: Ints, col: Ints, ratio: Array, claims: Ints, count: int) -> tuple[Side, Array]:
+def shared(start: Ints, col: Ints, ratio: Array, claims: Ints, count: int) -> tuple[Side, Array]:
     """The `count` pairs of plots that several tracks gate, their ratios to its miss and own plots together.
 
     Also returns that weight `free` (tracks,) of miss and own plots.
@@ -263,7 +263,7 @@ def _shared(start: Ints, col: Ints, ratio: Array, claims: Ints, count: int) -> t
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _by_plot(by_track: Side, columns: int) -> tuple[Side, Ints]:
+def arranged(by_track: Side, columns: int) -> tuple[Side, Ints]:
     """The same pairs by plot, and the place of each by track; of no `columns`, none."""
     pairs = by_track.other.size if columns > 0 else 0
     start = np.zeros(columns + 1, np.int64)
@@ -282,7 +282,7 @@ def _by_plot(by_track: Side, columns: int) -> tuple[Side, Ints]:
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _components(by_track: Side, columns: int) -> tuple[Ints, Ints]:
+def components(by_track: Side, columns: int) -> tuple[Ints, Ints]:
     """Tracks that share plots, one component after the other, and where each begins."""
     tracks = by_track.start.size - 1
     parent, claimant = np.arange(tracks), np.full(columns, -1, np.int64)
@@ -318,11 +318,11 @@ def _clusters(by_track: Side, claims: Ints, budget: float, approximate: Any) -> 
     pairs, tracks, columns = by_track.other.size, by_track.start.size - 1, claims.size
     if pairs == 0:
         return
-    members, begin = _components(by_track, columns)
+    members, begin = components(by_track, columns)
     left, sweeps = budget - _PASS * pairs, _sweeps(pairs, members.size)
     if _too_wide(by_track, claims):
         left = 0.0
-    by_plot, place = _by_plot(by_track, columns if left > 0.0 else 0)
+    by_plot, place = arranged(by_track, columns if left > 0.0 else 0)
     work, work2 = _work(max(tracks, columns), pairs), _work(max(tracks, columns), pairs)
     plots, listed = np.empty(columns, np.int64), np.zeros(columns, np.bool_)
     store, scratch = np.empty(1024), _messages(by_track, 0)
