@@ -23,7 +23,8 @@ from benchmarks.tracking import STRAIGHT, Case, alone, measure, peak_mb, score
 from radar_console.core.units import DEG
 from radar_console.estimation.motion import constant_velocity
 
-OURS = "ours, particle"
+OURS, OURS_SET = "ours, particle", "ours, particle, set JPDA"
+SETTINGS = {OURS: {"filter": "particle"}, OURS_SET: {"filter": "particle", "associator": "set-jpda"}}
 FIRST = 29  # scans of ring25 that the others are asked to track
 JOINT = ("PF + EHM2", "EKF + EHM2")
 EACH = (*JOINT, "UKF + EHM2", "EKF + GNN")
@@ -120,7 +121,7 @@ def rows_of(results: report.Results) -> list[str]:
         own = results.of(case.title, OURS)
         ours = median([run["cpu_ms"] for run in own]) if own else math.nan
         names = results.trackers(case.title)
-        for name in sorted(names, key=lambda name: name != OURS):
+        for name in sorted(names, key=lambda name: name not in SETTINGS):
             runs = results.of(case.title, name)
             cpu = median([run["cpu_ms"] for run in runs])
             rows.append([
@@ -161,14 +162,15 @@ def main(
     for case, peers in CASES:
         if only not in case.title or (quick and not case.quick):
             continue
-        ours = [alone(measure, case, {"filter": "particle"}, seed) for seed in range(1, case.seeds + 1)]
-        if ours[0] is None:
-            report.say(f"{case.title}: ours skipped, the tracker can't take given tracks")
-        else:
-            results.forget(case.title, OURS)
-            for seed, found in enumerate(ours, 1):
-                results.add(case.title, OURS, seed, found)
-                report.say(f"{case.title}, {OURS}, seed {seed}: {report.brief(found)}")
+        for name in (OURS, OURS_SET) if case.make == "formation" else (OURS,):
+            results.forget(case.title, name)
+            for seed in range(1, case.seeds + 1):
+                found = alone(measure, case, SETTINGS[name], seed)
+                if found is None:
+                    report.say(f"{case.title}: ours skipped, the tracker can't take given tracks")
+                    break
+                results.add(case.title, name, seed, found)
+                report.say(f"{case.title}, {name}, seed {seed}: {report.brief(found)}")
         for name in () if lacking else peers:
             label = f"Stone Soup, {name}"
             if again:

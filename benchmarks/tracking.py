@@ -31,6 +31,7 @@ CUT_OFF = 5000.0  # m, of GOSPA
 NEAR, LOST = 2000.0, 1000.0  # m, from a target: held by a track, and not lost by it
 STRAIGHT = {"process_noise_m2ps3": 1.0}
 """Settings for the scenes whose targets fly straight."""
+SET_JPDA = STRAIGHT | {"associator": "set-jpda"}
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -201,6 +202,8 @@ ACCURACY = [
     Case("crossing2, from scratch", "crossing2", {}, STRAIGHT, seeds=10),
     Case("formation 8, given", "formation", {"count": 8}, STRAIGHT, seeds=10, given=True),
     Case("formation 15, given", "formation", {"count": 15}, STRAIGHT, seeds=10, given=True),
+    Case("formation 8, given, set JPDA", "formation", {"count": 8}, SET_JPDA, seeds=10, given=True),
+    Case("formation 15, given, set JPDA", "formation", {"count": 15}, SET_JPDA, seeds=10, given=True),
     Case("swarm 200, from scratch", "swarm", {"count": 200}, {}, seeds=4),
 ]
 
