@@ -32,6 +32,9 @@ _Z_U, _Z_V = particle.Z_U, particle.Z_V
 # Added to the pass: random keys of what else happens in it.
 _UPDATE, _PARTING, _START = 1 << 40, 1 << 42, 1 << 41
 _KERNEL = 0.25
+# The adapted filter parts few particles and widely: a mode stays narrow, and a lost target is found again.
+_PARTED_OF = 4  # one of so many
+_WIDE_KERNEL = 0.7
 OPEN_SHARE = 0.9  # of the least variance of the plots: a little is drawn along all the axes
 _FLAT = 1e-4  # of the product of the variances: a determinant below it is rounding's
 _NEARLY = 0.999  # of the velocity's variance is left open at the start: what is drawn is no singular cloud
@@ -210,7 +213,7 @@ def update(
         take_moments(track, par, belief)
         # The shape of a cloud that is here or there, as those in a crowd often are, is too wide for a kernel.
         if effective < par.resample_below * weights.size and not track.crowded:
-            _part_copies(track, key, belief)
+            _part_copies(track, key, par, belief)
 
 
 @njit(cache=True, nogil=True, error_model="numpy", fastmath={"reassoc", "contract", "nsz"})
@@ -265,14 +268,18 @@ def _resample_cloud(track: Any, key: Any, par: Any, belief: Belief) -> None:
     particles[:] = scratch
     model[:] = model[ancestors]
     weights[:] = np.float32(1.0 / count)
-    _part_copies(track, key, belief)
+    _part_copies(track, key, par, belief)
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _part_copies(track: Any, key: Any, belief: Belief) -> None:
-    """Part the copies of particles by a kernel, whose shape is the cloud's own covariance, P less S."""
-    particles, S = belief.particles[track.slot], belief.P[track.slot, 0]
-    cov, scratch = np.empty((4, 4)), np.empty((4, particles.shape[1]), np.float32)
+def _part_copies(track: Any, key: Any, par: Any, belief: Belief) -> None:
+    """Part the copies of particles by a kernel, whose shape is the cloud's own covariance, P less S.
+
+    The particles of one ancestor stand together, so that one in a few is an even share of them all.
+    """
+    adapted, S, cov = par.proposal == ADAPTED, belief.P[track.slot, 0], np.empty((4, 4))
+    width = _WIDE_KERNEL if adapted else _KERNEL
+    particles = belief.particles[track.slot][:, :: _PARTED_OF if adapted else 1]
     _turn(track.P, track.cos, track.sin, cov)
     for axis in range(2):
         whole = cov[axis, axis] * cov[2 + axis, 2 + axis]
@@ -284,7 +291,8 @@ def _part_copies(track: Any, key: Any, belief: Belief) -> None:
         shape = cov[axis, axis] * cov[2 + axis, 2 + axis] - cov[axis, 2 + axis] ** 2
         if not (cov[axis, axis] > 0.0 and shape > _FLAT * whole):
             return
-    _regularise(particles, cov, _KERNEL, _mix(key + np.uint64(5)), belief.table, scratch)
+    scratch = np.empty((4, particles.shape[1]), np.float32)
+    _regularise(particles, cov, width, _mix(key + np.uint64(5)), belief.table, scratch)
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
