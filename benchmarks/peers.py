@@ -19,7 +19,7 @@ import numpy as np
 import typer
 
 from benchmarks import report
-from benchmarks.tracking import STRAIGHT, Case, alone, measure, peak_mb, score
+from benchmarks.tracking import ROUGHLY, STRAIGHT, WELL, Case, alone, formation, measure, peak_mb, score
 from radar_console.core.units import DEG
 from radar_console.estimation.motion import constant_velocity
 
@@ -35,8 +35,11 @@ CASES = [
     (Case("ring25, from scratch", "ring25", {"scans": FIRST}, STRAIGHT, seeds=3), JOINT),
     (Case("ring25, given", "ring25", {"scans": FIRST}, STRAIGHT, given=True), EACH),
     (Case("crossing2, given", "crossing2", {}, STRAIGHT, seeds=3, given=True), EACH),
-    (Case("formation 8, given", "formation", {"count": 8}, STRAIGHT, seeds=3, given=True, quick=True), EACH),
-    (Case("formation 15, given", "formation", {"count": 15}, STRAIGHT, seeds=3, given=True), EACH),
+    *(
+        (formation(count, errors, 3, quick=count == 8), EACH)
+        for errors in (WELL, ROUGHLY)
+        for count in (8, 15)
+    ),
 ]
 
 

@@ -155,6 +155,7 @@ class Case:
     settings : of [tracker]
     seeds : a run each
     given : confirmed tracks are there at the start
+    errors : of these, standard deviations in m and m/s
     pushes : sectors a turn
     quick : for `--quick`
     """
@@ -165,6 +166,7 @@ class Case:
     settings: dict[str, Any]
     seeds: int = 1
     given: bool = False
+    errors: tuple[float, float] = (100.0, 10.0)
     pushes: int = 1
     quick: bool = False
 
@@ -173,7 +175,23 @@ class Case:
         return scene
 
     def given_tracks(self, scene: Scene, seed: int) -> Table | None:
-        return scenes.given_tracks(scene, seed) if self.given else None
+        return scenes.given_tracks(scene, seed, *self.errors) if self.given else None
+
+
+def formation(
+    count: int,
+    errors: tuple[float, float],
+    seeds: int,
+    settings: dict[str, Any] = STRAIGHT,
+    quick: bool = False,
+) -> Case:
+    """A formation whose tracks are given, with these errors."""
+    title = f"formation {count}, given to {errors[0]:.0f} m" + (", set JPDA" if settings is SET_JPDA else "")
+    return Case(title, "formation", {"count": count}, settings, seeds, True, errors, quick=quick)
+
+
+WELL, ROUGHLY = (50.0, 5.0), (100.0, 10.0)
+"""Errors of given tracks: how well a formation is known decides what it costs."""
 
 
 def measure(case: Case, settings: dict[str, Any], seed: int) -> dict[str, Any] | None:
@@ -200,10 +218,12 @@ ACCURACY = [
     Case("dense E2, from scratch", "dense", {}, STRAIGHT, seeds=10),
     Case("crossing2, given", "crossing2", {}, STRAIGHT, seeds=60, given=True, quick=True),
     Case("crossing2, from scratch", "crossing2", {}, STRAIGHT, seeds=10),
-    Case("formation 8, given", "formation", {"count": 8}, STRAIGHT, seeds=10, given=True),
-    Case("formation 15, given", "formation", {"count": 15}, STRAIGHT, seeds=10, given=True),
-    Case("formation 8, given, set JPDA", "formation", {"count": 8}, SET_JPDA, seeds=10, given=True),
-    Case("formation 15, given, set JPDA", "formation", {"count": 15}, SET_JPDA, seeds=10, given=True),
+    *(
+        formation(count, errors, 10, settings)
+        for count in (8, 15)
+        for errors in (WELL, ROUGHLY)
+        for settings in (STRAIGHT, SET_JPDA)
+    ),
     Case("swarm 200, from scratch", "swarm", {"count": 200}, {}, seeds=4),
 ]
 
