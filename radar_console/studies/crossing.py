@@ -21,7 +21,7 @@ in place of 0.9999; process noise for straight courses (1 in place of 30 m²/s³
 is seen beside the same courses moved aside, 15 km apart at the least, and meeting at 0 m. Intervals are
 Wilson's, those of differences Newcombe's for the same runs.
 
-Running time: 200 runs take some 25 minutes on one core.
+Running time: 200 runs take some forty minutes on one core.
 """
 
 from typing import NamedTuple
