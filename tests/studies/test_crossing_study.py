@@ -121,7 +121,7 @@ def test_the_crossing_in_small(small):
     kept = found["both tracks kept, JPDA, σ = 50 m, 1/km²"]
     assert kept.published == 1.0
     assert kept.verdict == "as published of one run"
-    assert found["extra track, GNN, σ = 50 m, 1/km²"].runs == 2
+    assert found["extra track, GNN, σ = 50 m, 1/km²"].runs == 4
     for tracker in ("GNN", "JPDA"):
         assert found[f"swap, {tracker}, σ = 50 m, 0.1/km²"].ours == 0.0
         assert 0.4 < found[f"swap, {tracker}, σ = 50 m, 0.1/km²"].ci_high < 0.6
