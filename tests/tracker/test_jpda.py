@@ -287,3 +287,21 @@ def test_pairs_in_arrays_of_any_kind(shape: tuple[int, int]) -> None:
         assert np.array_equal(found.p, plain.p)
         assert np.array_equal(found.p_miss, plain.p_miss)
     assert all(np.array_equal(a, b) for a, b in zip((row, col, w), given, strict=True))
+
+
+def test_a_cluster_is_not_charged_for_the_search_of_the_one_before():
+    """Three hundred pairs of tracks after a crowd of twelve: what the crowd's second plan took is its own."""
+    rng = np.random.default_rng(0)
+    sizes = [(12, 14)] + [(2, 2)] * 300
+    tracks, columns = np.cumsum([(0, 0), *sizes], axis=0).T
+    blocks = [
+        np.indices(size).reshape(2, -1) + np.array([[t], [c]])
+        for size, t, c in zip(sizes, tracks[:-1], columns[:-1], strict=True)
+    ]
+    row, col = np.concatenate(blocks, axis=1)
+    w = rng.uniform(0.5, 2.0, len(row))
+    miss = np.full(tracks[-1], 0.1)
+    assert not jpda.sparse(miss, columns[-1], row, col, w, 1e6).approximate.any()
+    approximate = jpda.sparse(miss, columns[-1], row, col, w, 2e5).approximate
+    assert approximate[:12].all()
+    assert not approximate[12:].any()

@@ -333,7 +333,7 @@ def _clusters(by_track: Side, claims: Ints, budget: float, approximate: Any) -> 
             alone /= 1.0 + alone.sum()
             continue
         n = _list_plots(group, by_track, listed, plots)
-        cost, cost2, room, room2, spent = math.inf, math.inf, 0, 0, 0.0
+        cost, cost2, room, room2, looked2, spent = math.inf, math.inf, 0, 0, 0.0, 0.0
         if left > 0.0:
             patience = 0.5 * left / _LOOK
             cost, room, looked = _plan(group, by_track, by_plot, left, patience, work)
