@@ -42,7 +42,7 @@ def empty_map() -> Any:
 @bare
 def place(e: float, n: float, max_range: float) -> tuple[int, int]:
     """Ring and column of a position relative to the sensor."""
-    ring = min(int(math.hypot(e, n) / max_range * RINGS), RINGS - 1)
+    ring = min(int(math.sqrt(e * e + n * n) / max_range * RINGS), RINGS - 1)
     column = math.floor(math.atan2(e, n) / (2.0 * math.pi) * COLUMNS) % COLUMNS
     return ring, column
 
@@ -67,8 +67,8 @@ def survey(plot: Any, beam: Any, w: World) -> None:
     """Count what the beam met around a plot just before it; and keep the plot for those to come."""
     par, past, size, clutter = w.par, w.past, w.books.size, w.clutter
     de, dn = plot.e - beam.e, plot.n - beam.n
-    r = math.hypot(de, dn)
-    rho = 0.5 * par.max_speed * par.turn + math.hypot(par.sd_range, r * par.sd_azimuth)
+    r = math.sqrt(de * de + dn * dn)
+    rho = 0.5 * par.max_speed * par.turn + math.sqrt(par.sd_range**2 + (r * par.sd_azimuth) ** 2)
     half = math.asin(rho / r) if rho < r else math.pi
     plot.near, plot.exposure = 0.0, 0.5 * math.pi * rho * rho
     i = _first_from(past, size[N_PAST], plot.phi - half)

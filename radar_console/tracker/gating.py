@@ -8,6 +8,7 @@ from radar_console.tracker.records import CONFIRMED, STARTER
 
 MARGIN = math.radians(0.05)
 _TURN = 2.0 * math.pi
+_SMALL = 0.05  # rad, below which six terms of a series are enough
 _SPEED_SIGMAS = 2.0
 _SURE_SIGMAS = 4.5
 _DENSE_LIMIT = 9.21  # γ for 99 %: plots farther off in dense clutter say less for a target than a miss
@@ -22,6 +23,33 @@ def threshold(probability: float) -> float:
 def wrap(angle: float) -> float:
     """The same angle in (-π, π]."""
     return angle - _TURN * math.ceil(angle / _TURN - 0.5)
+
+
+@bare
+def arctangent(y: float, x: float) -> float:
+    """atan2(y, x): by its series, to the last digit, where it is as small as most are seen from a radar."""
+    if not abs(y) < _SMALL * x:
+        return math.atan2(y, x)
+    q = y / x
+    q2 = q * q
+    return q - q * q2 * (1.0 / 3.0 - q2 * (0.2 - q2 * (1.0 / 7.0 - q2 * (1.0 / 9.0 - q2 / 11.0))))
+
+
+@bare
+def arcsine(q: float) -> float:
+    """asin(q) for 0 ≤ q ≤ 1, where it is small by a series that is no less, and too much by 1e-9 at most."""
+    if q > _SMALL:
+        return math.asin(q)
+    q2 = q * q
+    return q * (1.0 + q2 * (1.0 / 6.0 + 0.08 * q2))
+
+
+@bare
+def place(track: Any, T: float) -> tuple[float, float]:
+    """East and north `T` s after the track's time, see `predicted`."""
+    x, curve = track.x, track.curve
+    half = 0.5 * T * T
+    return x[0] + T * x[2] + half * curve[0], x[1] + T * x[3] + half * curve[1]
 
 
 @bare
@@ -65,7 +93,7 @@ def extent(
     # A line at angle θ touches the ellipse where (r² - uu) tan²θ + 2 uw tanθ - ww = 0.
     if r2 <= 1.000001 * uu:
         return math.pi, math.inf
-    width = math.atan((abs(uw) + math.sqrt(uw * uw + (r2 - uu) * ww)) / (r2 - uu))
+    width = arctangent(abs(uw) + math.sqrt(uw * uw + (r2 - uu) * ww), r2 - uu)
     along = math.sqrt(uu)
     return width, along + 0.5 * ww / (r - along)
 
@@ -79,40 +107,64 @@ def limit(track: Any, par: Any) -> float:
 
 @bare
 def look(track: Any, beam: Any, par: Any) -> tuple[float, float]:
-    """Set the track's beam phase and its gate's extent; until which beam angle and time it can sleep."""
+    """Set the track's beam phase and its gate's extent; until which beam angle and time it can rest.
+
+    Both are -inf if the beam is in the gate, or may be.
+    """
     T = max(beam.t - track.t, 0.0)
-    e, n, ee, en, nn = predicted(track, T)
-    de, dn = e - beam.e, n - beam.n
-    track.rho = beam.phi - track.psi - _TURN - wrap(math.atan2(de, dn) - track.psi)
-    r = math.sqrt(de * de + dn * dn)
     if track.level == STARTER:
+        e, n = place(track, T)
+        de, dn = e - beam.e, n - beam.n
+        r = math.sqrt(de * de + dn * dn)
         # Where a target can have got to; the ellipse of its unknown velocity reaches farther.
         noise = track.sd_range * track.sd_range + (r * track.sd_azimuth) ** 2
         reach = start_reach(track, T, noise, par)
-        h, along = (math.asin(reach / r), reach) if reach < r else (math.pi, math.inf)
+        h, along = (arcsine(reach / r), reach) if reach < r else (math.pi, math.inf)
     else:
+        e, n, ee, en, nn = predicted(track, T)
+        de, dn = e - beam.e, n - beam.n
+        r = math.sqrt(de * de + dn * dn)
         gamma = limit(track, par) * (2.0 if par.rectangle else 1.0)  # of the ellipse around the rectangle
         h, along = extent(de, dn, ee, en, nn, track.sd_range, track.sd_azimuth, gamma)
-    track.half_width, track.along = h, along
-    ahead = -h - MARGIN - track.rho
-    if ahead <= 0.0 or h == math.pi or track.claims:
+    track.rho = beam.phi - track.psi - _TURN - turned(track, de, dn)
+    track.range, track.half_width, track.along = r, h, along
+    if track.claims:
         return -math.inf, -math.inf
-    # Until the beam is there the target moves on, and its gate grows, by `speed` at the most. Twice the
-    # angle of that, over the time that the beam should take, is left to it; if it takes longer, the
-    # track wakes by time. Of the way ahead at least half goes by in sleep.
+    return rest(track, beam, par)
+
+
+@bare
+def turned(track: Any, de: float, dn: float) -> float:
+    """The angle from the bearing of the last pass to that of a place seen from the sensor."""
+    return arctangent(de * track.u_n - dn * track.u_e, de * track.u_e + dn * track.u_n)
+
+
+@bare
+def rest(track: Any, beam: Any, par: Any) -> tuple[float, float]:
+    """Until which beam angle and time a track can rest whose phase and extent are set, see `look`."""
+    r, h = track.range, track.half_width
+    ahead = -h - MARGIN - track.rho
+    if ahead <= 0.0 or h == math.pi:
+        return -math.inf, -math.inf
+    # Until the beam is there the target moves on, and its gate grows, by `speed` at the most. The angle
+    # of that, over the time that the beam should take, is left to it, and that it is seen from nearer
+    # then, and aslant; if the beam takes longer, the track wakes by time. Of the way ahead at least half
+    # goes by at rest.
     # A starter stands still, and its reach grows by the largest speed; a radar that moves may do the same.
     x, P, speed = track.x, track.P, 2.0 * par.max_speed
     if track.level != STARTER or h > 1.0:
         speed = math.sqrt(x[2] * x[2] + x[3] * x[3]) + 10.0 * math.sqrt(P[2, 2] + P[3, 3]) + par.max_speed
-    sleep = min(1.25 * par.turn * ahead / _TURN, min(0.25 * ahead, 0.5) * r / speed)
-    return beam.phi + ahead - 2.0 * speed * sleep / r, beam.t + sleep
+    most = r / speed  # s, in which it gets a radian on
+    wait = min(1.25 * par.turn * ahead / _TURN, min(0.25 * ahead, 0.5) * most)
+    far = h < 0.4 and wait < 0.05 * most
+    return beam.phi + ahead - (1.2 if far else 2.0) * wait / most, beam.t + wait
 
 
 @bare
 def drift(track: Any, lag: float) -> float:
     """How far the track's gate can move in `lag` s, m."""
     x, P = track.x, track.P
-    speed: float = math.hypot(x[2], x[3]) + _SURE_SIGMAS * math.sqrt(P[2, 2] + P[3, 3])
+    speed: float = math.sqrt(x[2] * x[2] + x[3] * x[3]) + _SURE_SIGMAS * math.sqrt(P[2, 2] + P[3, 3])
     return lag * speed
 
 
@@ -129,7 +181,7 @@ def too_fast(track: Any, par: Any) -> bool:
     """The track is surely faster than targets are."""
     x, P = track.x, track.P
     slack = _SPEED_SIGMAS * math.sqrt(P[2, 2] + P[3, 3])
-    return bool(math.hypot(x[2], x[3]) > par.max_speed + slack)
+    return bool(math.sqrt(x[2] * x[2] + x[3] * x[3]) > par.max_speed + slack)
 
 
 @bare

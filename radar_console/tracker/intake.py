@@ -23,17 +23,26 @@ _REFRACTION = 4.0 / 3.0  # of the earth's radius, for the path of a beam
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def interpolate(x: float, known: Array, values: Array) -> float:
-    """The value at `x`, linear between `known` (n,), which never decrease; constant beyond its ends."""
+def bracket(x: float, known: Array) -> tuple[int, float]:
+    """The last of `known` (n,) that is not above `x`, and the part of the way to the next one.
+
+    They never decrease. Before the first it is the first, beyond the last the last, and no part of a way.
+    """
     last = known.size - 1
     if x <= known[0]:
-        return float(values[0])
+        return 0, 0.0
     if x >= known[last]:
-        return float(values[last])
+        return last, 0.0
     hi = np.searchsorted(known, x, side="right")
     x0, x1 = known[hi - 1], known[hi]
-    part = (x - x0) / (x1 - x0) if x1 > x0 else 1.0
-    return float(values[hi - 1] + part * (values[hi] - values[hi - 1]))
+    return int(hi) - 1, (x - x0) / (x1 - x0) if x1 > x0 else 1.0
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def between(values: Array, lower: int, part: float) -> float:
+    """Part of the way from one value to the next."""
+    value: float = values[lower]
+    return value + part * (values[lower + 1] - value) if part > 0.0 else value
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -50,11 +59,13 @@ def bins(log: Array, known: int, seen: Any, first: int, width: float, beams: Any
     `seen` (m,): the radar looked between the edge before and this one.
     """
     time, angle, east, north = log[0, :known], log[1, :known], log[2, :known], log[3, :known]
-    before = rounded(interpolate(first * width, angle, time))
+    lower, part = bracket(first * width, angle)
+    before = rounded(between(time, lower, part))
     for k in range(beams.size):
         beam, end = beams[k], (first + k + 1) * width
-        beam.phi, beam.t = end, rounded(interpolate(end, angle, time))
-        beam.e, beam.n = rounded(interpolate(end, angle, east)), rounded(interpolate(end, angle, north))
+        lower, part = bracket(end, angle)
+        beam.phi, beam.t = end, rounded(between(time, lower, part))
+        beam.e, beam.n = rounded(between(east, lower, part)), rounded(between(north, lower, part))
         beam.step, before = beam.t - before, beam.t
         middle = np.searchsorted(angle, end - 0.5 * width)
         beam.seen = seen[min(middle, known - 1)]
@@ -88,7 +99,8 @@ def take(
             or not 0.0 <= r <= _FARTHEST
         ):
             continue
-        angle = interpolate(t, time, angles)
+        lower, part = bracket(t, time)
+        angle = between(angles, lower, part)
         # The watermark bounds what a time can say: nothing below it is delivered any more. What is
         # so late that the nearest turn would be one ahead is taken at its word.
         if angle >= closed - 0.5 * _TURN:
@@ -100,9 +112,8 @@ def take(
         plot = plots[n]
         n += 1
         plot.phi, plot.t, plot.ordinal = phi, t, row.ordinal
-        plot.s_e = rounded(interpolate(t, time, east))
-        plot.s_n = rounded(interpolate(t, time, north))
-        sensor_height = above_sea + rounded(interpolate(t, time, up))
+        plot.s_e, plot.s_n = rounded(between(east, lower, part)), rounded(between(north, lower, part))
+        sensor_height = above_sea + rounded(between(up, lower, part))
         claims += _height(plot, row, sensor_height)
         plot.range = _ground_range(r, plot.up, sensor_height)
         if not heights:

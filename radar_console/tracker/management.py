@@ -7,7 +7,7 @@ import numpy as np
 
 from radar_console.core.messages import TrackStatus
 from radar_console.estimation.gaussian import Array
-from radar_console.tracker import clutter, filters, gating, height, identity
+from radar_console.tracker import agenda, clutter, filters, gating, height, identity
 from radar_console.tracker.kernels import bare, inlined, owning
 from radar_console.tracker.records import (
     AUTO,
@@ -46,7 +46,9 @@ from radar_console.tracker.records import (
     variable,
 )
 
-_wrap, _too_fast, _start_belief, _predicted = gating.wrap, gating.too_fast, filters.start, gating.predicted
+_too_fast, _predicted, _place, _turned = gating.too_fast, gating.predicted, gating.place, gating.turned
+_rest, _start_belief = gating.rest, filters.start
+_enter, _sleep, _leave, _move_entry = agenda.enter, agenda.rest, agenda.leave, agenda.move
 _gather = clutter.gather
 _height, _begin_height, _learn = height.predicted, height.begin, identity.learn
 _TURN = 2.0 * math.pi
@@ -73,7 +75,7 @@ def begin(plot: Any, dense: bool, w: World) -> None:
     index = w.books.size[N_TRACKS]
     track, par = w.tracks[index], w.par
     w.books.size[N_TRACKS] += 1
-    w.books.wake[index] = -math.inf
+    _enter(index, w.books)
     track.id, track.born, track.t = plot.ordinal, plot.t, plot.t
     x, P = track.x, track.P
     x[0], x[1], x[2], x[3] = plot.e, plot.n, 0.0, 0.0
@@ -85,7 +87,7 @@ def begin(plot: Any, dense: bool, w: World) -> None:
     track.curve[0] = track.curve[1] = track.growth[1] = 0.0
     track.growth[0] = track.growth[2] = par.q / 3.0
     track.sd_range, track.sd_azimuth = plot.sd_range, plot.sd_azimuth
-    track.psi = plot.phi
+    track.psi, track.u_e, track.u_n = plot.phi, math.sin(plot.phi), math.cos(plot.phi)
     track.score, track.level = _FIRST_SCORE, STARTER
     track.peak = track.score
     track.history, track.passes, track.hits, track.misses = 1, 1, 1, 0
@@ -119,11 +121,18 @@ def serve(
     as it was. A pass over a blanked sector without a plot is no miss: the radar did not look.
     """
     t_pass = track.t if seen else max(beam.t - max(track.rho, 0.0) / par.bin * beam.step, track.t)
-    e, n, _, _, _ = _predicted(track, t_pass - track.t)
-    crossed = beam.phi - track.rho
-    track.psi += _TURN + _wrap(math.atan2(e - beam.e, n - beam.n) - track.psi)
+    e, n = _place(track, t_pass - track.t)
+    de, dn = e - beam.e, n - beam.n
+    r, crossed = math.sqrt(de * de + dn * dn), beam.phi - track.rho
+    track.psi += _TURN + _turned(track, de, dn)
+    if r > 0.0:
+        track.u_e, track.u_n = de / r, dn / r
     track.served, track.claims = True, False
-    books.wake[index] = -math.inf
+    if not seen:  # the gate is what it was, a turn on
+        track.rho -= _TURN
+        angle, time = _rest(track, beam, par)
+        if angle > beam.phi:
+            _sleep(index, angle, time, par.bin, books)
     if not seen and books.blank[math.floor(crossed / par.bin) % books.blank.size]:
         books.tally[C_BLANKED] += 1
         return
@@ -260,7 +269,7 @@ def adopt(index: int, sensor_e: float, sensor_n: float, w: World) -> None:
     track.score = track.peak = max(_highest_score(par), par.confirm_score)
     track.level, track.slot = CONFIRMED, w.books.size[N_SLOTS]
     w.belief.owner[track.slot] = index
-    w.books.wake[index] = -math.inf
+    _enter(index, w.books)
     w.books.size[N_SLOTS] += 1
     w.books.size[N_TRACKS] += 1
     _start_belief(track, sensor_e, sensor_n, par, w.belief)
@@ -340,6 +349,7 @@ def bury(w: World) -> None:
     if count == 0:
         return
     for k in range(count):
+        _leave(w.books.dead[k], w.books)
         slot = tracks[w.books.dead[k]].slot
         if slot >= 0:
             last = size[N_SLOTS] - 1
@@ -367,7 +377,7 @@ def bury(w: World) -> None:
             mover -= 1
         tracks[mover].place = index  # for its edges
         tracks[index] = tracks[mover]
-        w.books.wake[index, 0], w.books.wake[index, 1] = w.books.wake[mover, 0], w.books.wake[mover, 1]
+        _move_entry(mover, index, w.books)
         if tracks[index].slot >= 0:
             belief.owner[tracks[index].slot] = index
         mover -= 1

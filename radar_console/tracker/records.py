@@ -27,8 +27,11 @@ STATE = np.dtype(
         ("sd_range", "f8"),  # of its plots: what the next one's are likely to be
         ("sd_azimuth", "f8"),
         ("psi", "f8"),  # unwrapped bearing of the last pass
+        ("u_e", "f8"),  # the unit vector that way
+        ("u_n", "f8"),
         ("rho", "f8"),  # beam phase relative to the next pass
         ("half_width", "f8"),  # of the gate, seen from the radar
+        ("range", "f8"),  # m, of its middle from the sensor
         ("along", "f8"),  # m, half the extent of the gate in range
         ("level", "i8"),
         ("dense", "?"),  # it was born in dense clutter
@@ -117,6 +120,16 @@ EDGE = np.dtype(
     align=True,
 )
 """A plot in a track's gate; it stays until all who claim the plot are served."""
+
+ENTRY = np.dtype(
+    [
+        ("bin", "i8"),  # of the turn, in whose list it is; -1 in none
+        ("before", "i8"),  # its neighbours there; -1 none
+        ("after", "i8"),
+        ("time", "f8"),  # s, when it is due even if the beam is not there
+    ]
+)
+"""A track in the calendar, see `agenda`."""
 
 MEMBER = np.dtype(
     [
@@ -237,10 +250,22 @@ SWEPT_COUNTS = (
 ) = range(len(SWEPT_COUNTS))
 
 # How much of each table is in use, in an int64 array.
-N_TRACKS, N_POOL, N_EDGES, N_SLOTS, N_ROWS, N_QUEUE, N_OPEN, N_MEMBERS, N_PAIRS, N_DEAD, N_PHASE, N_PAST = (
-    range(12)
-)
-SIZES = 12
+(
+    N_TRACKS,
+    N_POOL,
+    N_EDGES,
+    N_SLOTS,
+    N_ROWS,
+    N_QUEUE,
+    N_OPEN,
+    N_MEMBERS,
+    N_PAIRS,
+    N_DEAD,
+    N_PHASE,
+    N_PAST,
+    N_NEXT_BIN,  # its unwrapped number
+) = range(13)
+SIZES = 13
 
 
 # Columns of a confirmed track's whereabouts: when it was born; time, position and velocity; a quadratic
@@ -253,7 +278,9 @@ class Books(NamedTuple):
     """What the accounting of a pass writes; handed on by itself, since it is small."""
 
     rows: Any  # TRACK table
-    wake: NDArray[np.float64]  # (tracks, 2) beam angle and time before which a gate can't be reached
+    agenda: Any  # ENTRY table (tracks,)
+    pages: NDArray[np.int64]  # (bins,) first track of each bin's list; -1 none
+    alarm: NDArray[np.float64]  # (1,) s, time at which a track that rests may be due
     dead: NDArray[np.int64]  # (tracks,) the rows to be buried at the bin's end
     whereabouts: NDArray[np.float64]  # (slots, WHEREABOUTS) of confirmed tracks, see `management.note`
     blank: NDArray[np.bool_]  # (bins,) the radar did not look

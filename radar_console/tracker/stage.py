@@ -28,9 +28,11 @@ from radar_console.tracker.management import adopt
 from radar_console.tracker.records import (
     BEAM,
     EDGE,
+    ENTRY,
     MEMBER,
     N_EDGES,
     N_MEMBERS,
+    N_NEXT_BIN,
     N_PAIRS,
     N_PAST,
     N_POOL,
@@ -143,6 +145,7 @@ class Tracker:
         self._log.append(sector)
         if self._next_bin is None:
             self._next_bin = math.floor(self._log.angle[0] / self._bin) + 1
+            self._world.books.size[N_NEXT_BIN] = self._next_bin
             self._world.clutter["last"] = math.floor(self._log.angle[0] / TURN * clutter.COLUMNS)
         self._skip_long_gap()
         if len(sector.centroids):
@@ -180,6 +183,7 @@ class Tracker:
         beam, (east, north, _) = float(self._log.angle[-1]), self._last.position
         azimuth = np.arctan2(tracks["east"] - east, tracks["north"] - north)
         rows["psi"] = beam - np.mod(beam - azimuth, TURN)
+        rows["u_e"], rows["u_n"] = np.sin(azimuth), np.cos(azimuth)
         rows["last"] = rows["previous"] = rows["first"] = rows["mode_3a"] = rows["address"] = -1
         rows["hits"] = rows["passes"] = self.settings.confirm_hits
         rows["history"], rows["voiced"] = 1, True
@@ -230,7 +234,8 @@ class Tracker:
         turns = math.floor(gap / TURN)
         if turns >= _FEW_TURNS:
             self._world.tracks["psi"] += turns * TURN
-            self._world.books.wake[:] = -np.inf
+            self._world.books.agenda["time"] = -np.inf
+            self._world.books.alarm[:] = -np.inf
             self._next_bin = self._next_bin_number + turns * self.settings.bins
 
     def _run(self, complete: float, final: bool) -> Table:
@@ -249,7 +254,7 @@ class Tracker:
         while done < len(beams):
             done += self._sweep(beams[done:] if done else beams, final)
             if size[N_ROWS]:
-                rows.append(self._world.books.rows[: size[N_ROWS]].copy())
+                rows.append(_copied(self._world.books.rows[: size[N_ROWS]]))
                 size[N_ROWS] = 0
             if done < len(beams):
                 self._world = _grown(self._world)
@@ -444,7 +449,9 @@ def _empty_world(settings: TrackerSettings, radar: Radar, seed: int) -> World:
         tracks=np.zeros(64, STATE),
         books=Books(
             rows=np.zeros(256, TRACK),
-            wake=np.zeros((64, 2)),
+            agenda=np.zeros(64, ENTRY),
+            pages=np.full(settings.bins, -1),
+            alarm=np.full(1, np.inf),
             dead=np.zeros(64, np.int64),
             whereabouts=np.zeros((slots, WHEREABOUTS)),
             blank=np.zeros(settings.bins, np.bool_),
@@ -476,7 +483,12 @@ _ROOM = {
     "pairs": N_PAIRS,
     "relative": N_PAIRS,
 }
-_BOOK_ROOM = {"rows": N_ROWS, "wake": N_TRACKS, "dead": N_TRACKS, "whereabouts": N_SLOTS}
+_BOOK_ROOM = {
+    "rows": N_ROWS,
+    "agenda": N_TRACKS,
+    "dead": N_TRACKS,
+    "whereabouts": N_SLOTS,
+}
 
 
 def _grown(world: World) -> World:
@@ -486,6 +498,11 @@ def _grown(world: World) -> World:
     tables = {name: _longer(getattr(world, name), need[place]) for name, place in _ROOM.items()}
     books = {name: _longer(getattr(world.books, name), need[place]) for name, place in _BOOK_ROOM.items()}
     return world._replace(belief=belief._replace(**slots), books=world.books._replace(**books), **tables)
+
+
+def _copied(rows: Any) -> Any:
+    """A copy of a table by its bytes: NumPy would go field by field."""
+    return rows.view(np.uint8).copy().view(rows.dtype)
 
 
 def _longer(table: Any, count: int) -> Any:

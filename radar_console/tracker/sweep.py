@@ -1,7 +1,7 @@
 """The compiled heart: tracks served bin by bin as the beam passes.
 
-At each bin's end every track is asked where the beam stands relative to its own next pass (ρ), and
-how wide its gate is (h). Between ρ = -h and ρ = h it claims plots. When the beam is past the gates of
+At a bin's end each track that the calendar has there is asked where the beam stands relative to its
+own next pass (ρ), and how wide its gate is (h). Between ρ = -h and ρ = h it claims plots. When the beam is past the gates of
 all confirmed tracks that share plots, their association is solved and each is served: exactly once a
 pass. Young tracks come after them, each on its own.
 """
@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from radar_console.tracker import clusters, clutter, gating, labels, management, order, youth
+from radar_console.tracker import agenda, clusters, clutter, gating, labels, management, order, youth
 from radar_console.tracker.kernels import bare, inlined, owning
 from radar_console.tracker.records import (
     N_EDGES,
@@ -29,6 +29,7 @@ from radar_console.tracker.records import (
     World,
 )
 
+_turn_page, _tear, _rest, _at_once = agenda.turn_page, agenda.tear, agenda.rest, agenda.at_once
 _look, _density, _drift, _MARGIN = gating.look, gating.density, gating.drift, gating.MARGIN
 _group, _weigh, _associate, _step = clusters.group, clusters.weigh, clusters.associate, clusters.step
 _serve_members, _settle_young, _retire, _purge = (
@@ -42,7 +43,7 @@ _bury, _turn_to = management.bury, clutter.turn_to
 _survey, _forget = clutter.survey, clutter.forget
 _ascending = order.ascending
 
-_OPENED = 1
+_FRESH, _FOUND, _OPENED = range(3)
 
 
 @bare
@@ -69,8 +70,10 @@ def open_bin(beam: Any, queue: Any, w: World, final: bool) -> bool:
     size, need = w.books.size, w.need
     for k in range(need.size):
         need[k] = size[k]
-    if size[N_PHASE] != _OPENED:
+    if size[N_PHASE] == _FRESH:
         _find_open(beam, w)
+        size[N_PHASE] = _FOUND
+    if size[N_PHASE] == _FOUND:
         if not _gate(beam, queue, w):
             return False
         cell = math.floor(beam.phi / w.par.bin - 0.5)
@@ -97,21 +100,26 @@ def close_bin(beam: Any, w: World, final: bool) -> None:
     _bury(w)
     _turn_to(w.clutter, beam.phi)
     _forget(beam.phi, w)
-    w.books.size[N_PHASE] = 0
+    w.books.size[N_PHASE] = _FRESH
 
 
 @inlined
 def _find_open(beam: Any, w: World) -> None:
     """List the tracks whose gates the beam has reached and that were not served since."""
-    n, wake = 0, w.books.wake
-    for i in range(w.books.size[N_TRACKS]):
-        if beam.phi < wake[i, 0] and beam.t < wake[i, 1]:
-            continue
-        track = w.tracks[i]
-        wake[i, 0], wake[i, 1] = _look(track, beam, w.par)
+    n, width = 0, w.par.bin
+    after = _turn_page(beam, width, w.books)
+    while after >= 0:
+        index = after
+        after = _tear(index, w.books)
+        track = w.tracks[index]
+        angle, time = _look(track, beam, w.par)
+        if angle > beam.phi:
+            _rest(index, angle, time, width, w.books)
+        else:
+            _at_once(index, w.books)
         if track.claims or track.rho >= -track.half_width - _MARGIN:
             track.place, track.first = n, -1
-            w.opened[n] = i
+            w.opened[n] = index
             n += 1
     w.books.size[N_OPEN] = n
 
@@ -165,7 +173,8 @@ def _join(fresh: Any, beam: Any, w: World) -> int:
     size, par, edges, n = w.books.size, w.par, w.edges, fresh.size
     distance, lag = np.empty(n), 0.0
     for k in range(n):
-        distance[k] = math.hypot(fresh[k].e - beam.e, fresh[k].n - beam.n)
+        e, north = fresh[k].e - beam.e, fresh[k].n - beam.n
+        distance[k] = math.sqrt(e * e + north * north)
         lag = max(lag, abs(beam.t - fresh[k].t))
     by_range = _ascending(distance)
     distance = distance[by_range]
@@ -175,10 +184,7 @@ def _join(fresh: Any, beam: Any, w: World) -> int:
         track = w.tracks[index]
         if track.swept:
             continue
-        T = max(beam.t - track.t, 0.0)
-        e = track.x[0] + T * track.x[2] + 0.5 * T * T * track.curve[0] - beam.e
-        north = track.x[1] + T * track.x[3] + 0.5 * T * T * track.curve[1] - beam.n
-        r, along = math.hypot(e, north), track.along + _drift(track, lag)
+        r, along = track.range, track.along + _drift(track, lag)
         i = np.searchsorted(distance, r - along)
         while i < n and distance[i] <= r + along:
             plot = fresh[by_range[i]]

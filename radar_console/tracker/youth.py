@@ -25,7 +25,7 @@ from radar_console.estimation.kalman import (
     mix_in_place,
     predict_in_place,
 )
-from radar_console.tracker import clusters, clutter, gating, height, management, order
+from radar_console.tracker import agenda, clusters, clutter, gating, height, management, order
 from radar_console.tracker.kernels import bare, inlined, owning
 from radar_console.tracker.records import (
     AUTO,
@@ -52,6 +52,7 @@ from radar_console.tracker.records import (
 
 _BROAD = particle.BROAD
 _density_of, _predicted, _MARGIN = gating.density_of, gating.predicted, gating.MARGIN
+_enter = agenda.enter
 _density_at, _doubted = clutter.density_at, clutter.doubted
 _evidence, _update_height = clusters.evidence, height.update
 _serve, _begin, _kill, _report = management.serve, management.begin, management.kill, management.report
@@ -218,9 +219,10 @@ def _settle_branching(index: int, beam: Any, w: World) -> None:
         k = edges[k].next
     miss = 1.0 - par.p_d * par.p_g
     least = _PRUNE * miss
-    if track.level == TENTATIVE:
+    if best >= 0 and track.level == TENTATIVE:
         least = math.exp(track.peak - _DROP - track.score)
-    if value > least:
+    taken = best >= 0 and value > least
+    if taken:
         _branch(index, best, track.voiced, beam, w)
         k = track.first
         while k >= 0:
@@ -231,7 +233,7 @@ def _settle_branching(index: int, beam: Any, w: World) -> None:
     track.score += math.log(max(miss, 1e-300))
     lost = track.score < track.peak - _DROP
     if track.level == STARTER:
-        lost = value > least and _branches(track, par)
+        lost = taken and _branches(track, par)
     if lost and not track.voiced:
         _kill(track, index, w.books)
         return
@@ -249,6 +251,7 @@ def _branch(index: int, k: int, voiced: bool, beam: Any, w: World) -> None:
     child, edge = w.books.size[N_TRACKS], w.edges[k]
     w.books.size[N_TRACKS] += 1
     w.tracks[child] = w.tracks[index]
+    _enter(child, w.books)
     track, chosen = w.tracks[child], edge.plot
     track.score += math.log(edge.density)
     if track.level == STARTER:
