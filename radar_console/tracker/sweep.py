@@ -1,9 +1,9 @@
 """The compiled heart: tracks served bin by bin as the beam passes.
 
 At a bin's end each track that the calendar has there is asked where the beam stands relative to its
-own next pass (ρ), and how wide its gate is (h). Between ρ = -h and ρ = h it claims plots. When the beam is past the gates of
-all confirmed tracks that share plots, their association is solved and each is served: exactly once a
-pass. Young tracks come after them, each on its own.
+own next pass (ρ), and how wide its gate is (h). Between ρ = -h and ρ = h it claims plots. When the
+beam is past the gates of all confirmed tracks that share plots, their association is solved and each
+is served: exactly once a pass. Young tracks come after them, each on its own.
 """
 
 import math
