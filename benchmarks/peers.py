@@ -19,7 +19,18 @@ import numpy as np
 import typer
 
 from benchmarks import report
-from benchmarks.tracking import ROUGHLY, STRAIGHT, WELL, Case, alone, formation, measure, peak_mb, score
+from benchmarks.tracking import (
+    ROUGHLY,
+    STRAIGHT,
+    WELL,
+    Case,
+    alone,
+    formation,
+    measure,
+    peak_mb,
+    score,
+    with_tracks,
+)
 from radar_console.core.units import DEG
 from radar_console.estimation.motion import constant_velocity
 
@@ -33,8 +44,8 @@ GET = ".venv/bin/pip install --require-hashes -r requirements-bench.lock"
 # Scenes, and the peers' trackers that run on them.
 CASES = [
     (Case("ring25, from scratch", "ring25", {"scans": FIRST}, STRAIGHT, seeds=3), JOINT),
-    (Case("ring25, given", "ring25", {"scans": FIRST}, STRAIGHT, given=True), EACH),
-    (Case("crossing2, given", "crossing2", {}, STRAIGHT, seeds=3, given=True), EACH),
+    (with_tracks("ring25", "ring25", {"scans": FIRST}, WELL, seeds=1), EACH),
+    *((with_tracks("crossing2", "crossing2", {}, errors, seeds=3), EACH) for errors in (WELL, ROUGHLY)),
     *(
         (formation(count, errors, 3, quick=count == 8), EACH)
         for errors in (WELL, ROUGHLY)

@@ -32,6 +32,8 @@ NEAR, LOST = 2000.0, 1000.0  # m, from a target: held by a track, and not lost b
 STRAIGHT = {"process_noise_m2ps3": 1.0}
 """Settings for the scenes whose targets fly straight."""
 SET_JPDA = STRAIGHT | {"associator": "set-jpda"}
+WELL, ROUGHLY = (50.0, 5.0), (100.0, 10.0)
+"""Errors of given tracks, m and m/s: how well they are known decides what a dense scene costs."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -166,7 +168,7 @@ class Case:
     settings: dict[str, Any]
     seeds: int = 1
     given: bool = False
-    errors: tuple[float, float] = (100.0, 10.0)
+    errors: tuple[float, float] = ROUGHLY
     pushes: int = 1
     quick: bool = False
 
@@ -178,6 +180,20 @@ class Case:
         return scenes.given_tracks(scene, seed, *self.errors) if self.given else None
 
 
+def with_tracks(
+    title: str,
+    make: str,
+    arguments: dict[str, Any],
+    errors: tuple[float, float],
+    seeds: int,
+    settings: dict[str, Any] = STRAIGHT,
+    quick: bool = False,
+) -> Case:
+    """A scene whose targets' tracks are given, with these errors."""
+    title += f", given to {errors[0]:.0f} m" + (", set JPDA" if settings is SET_JPDA else "")
+    return Case(title, make, arguments, settings, seeds, True, errors, quick=quick)
+
+
 def formation(
     count: int,
     errors: tuple[float, float],
@@ -186,12 +202,7 @@ def formation(
     quick: bool = False,
 ) -> Case:
     """A formation whose tracks are given, with these errors."""
-    title = f"formation {count}, given to {errors[0]:.0f} m" + (", set JPDA" if settings is SET_JPDA else "")
-    return Case(title, "formation", {"count": count}, settings, seeds, True, errors, quick=quick)
-
-
-WELL, ROUGHLY = (50.0, 5.0), (100.0, 10.0)
-"""Errors of given tracks: how well a formation is known decides what it costs."""
+    return with_tracks(f"formation {count}", "formation", {"count": count}, errors, seeds, settings, quick)
 
 
 def measure(case: Case, settings: dict[str, Any], seed: int) -> dict[str, Any] | None:
@@ -216,7 +227,8 @@ GROWTH = [_growing(count, 15) for count in (10, 100, 1000, 3000, 10_000)]
 ACCURACY = [
     Case("ring25, from scratch", "ring25", {}, STRAIGHT, seeds=10, quick=True),
     Case("dense E2, from scratch", "dense", {}, STRAIGHT, seeds=10),
-    Case("crossing2, given", "crossing2", {}, STRAIGHT, seeds=60, given=True, quick=True),
+    with_tracks("crossing2", "crossing2", {}, WELL, seeds=60, quick=True),
+    with_tracks("crossing2", "crossing2", {}, ROUGHLY, seeds=60),
     Case("crossing2, from scratch", "crossing2", {}, STRAIGHT, seeds=10),
     *(
         formation(count, errors, 10, settings)
