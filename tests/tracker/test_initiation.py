@@ -22,7 +22,7 @@ from scenes import (
 from radar_console.core.messages import Radar, TrackStatus
 from radar_console.core.units import TURN
 from radar_console.tracker import Tracker, youth
-from radar_console.tracker.records import N_TRACKS, STATE
+from radar_console.tracker.records import N_EDGES, N_TRACKS, STATE
 
 MODES = ["auto", "m-of-n", "score", "branching"]
 
@@ -187,6 +187,25 @@ def test_capacity_takes_the_least_likely_young_tracks(crowd):
     assert counts.capped > 1000
     assert counts.lost == 0
     assert {target_of(rows, crowd, track) for track in held(rows)} == set(range(40))
+
+
+def test_what_goes_takes_its_plots_along(crowd):
+    """A row that was freed and taken again has no plots of its former owner, who may have been anywhere."""
+    tracker = Tracker(settings(max_tracks=200, clutter_per_km2=None), RADAR, 7, 1)
+    joined = 0
+    for sector in crowd.sectors(256):
+        tracker.push(sector)
+        world = tracker._world
+        tracks = world.tracks[: world.books.size[N_TRACKS]]
+        edges = world.edges[: world.books.size[N_EDGES]]
+        joined += len(edges)
+        assert (edges["track"] < len(tracks)).all()
+        mine, plots = tracks[edges["track"]], world.pool[edges["plot"]]
+        apart = np.hypot(plots["e"] - mine["x"][:, 0], plots["n"] - mine["x"][:, 1])
+        # In six turns of 4 s nobody gets farther than 10 km; an azimuth errs by half of one.
+        assert (apart < 15e3).all()
+    assert tracker.counts.capped > 500
+    assert joined > 100
 
 
 def test_without_too_many_tracks_none_is_capped(crowd):
