@@ -368,12 +368,12 @@ def _add_up_clusters(
     ordinal, store = np.arange(most), np.empty(1024)
     touched, ahead = np.empty(1), 0
     for g in range(begin.size - 1):
-        group = members[begin[g] : begin[g + 1]]
-        if group.size == 1:
-            _leave_alone(group[0], every, p_miss, approximate)
+        if begin[g + 1] - begin[g] == 1:
+            _leave_alone(members[begin[g]], every, p_miss, approximate)
             continue
         if left <= 0.0:
             continue
+        group = members[begin[g] : begin[g + 1]]
         if claims.size > _FAR and begin[g + 1] > ahead:
             touched[0] = _touch(members, begin[g], every, claims, number)
             ahead = begin[g] + _AHEAD
