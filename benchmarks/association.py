@@ -37,6 +37,11 @@ PRUNE = 1e-3  # of the miss weight
 KM2 = 1e-6
 
 
+Ints = NDArray[np.int64]
+Pairs = tuple[Array, int, Ints, Ints, Array]
+"""As `jpda.sparse` takes them: miss, plots, row, column, weight."""
+
+
 class Case(NamedTuple):
     name: str
     likelihood: Array
@@ -142,6 +147,51 @@ def cases(seed: int) -> Iterator[Case]:
     yield Case("25 crowds of 40 × 40", crowds, False, False)
 
 
+def side_by_side(count: int, tracks: int, plots: int, rng: np.random.Generator, mixed: bool = False) -> Pairs:
+    """So many clusters, each all gated; `mixed` in any order."""
+    row, column = (np.arange(count)[:, None, None] * n + index for n, index in (
+        (tracks, np.arange(tracks)[:, None] + np.zeros(plots, int)),
+        (plots, np.arange(plots) + np.zeros((tracks, 1), int)),
+    ))  # fmt: skip
+    row, column = row.ravel(), column.ravel()
+    if mixed:
+        row, column = rng.permutation(count * tracks)[row], rng.permutation(count * plots)[column]
+        order = np.argsort(row, kind="stable")
+        row, column = row[order], column[order]
+    return pairs(count * tracks, count * plots, row, column, rng)
+
+
+def at_random(tracks: int, plots: int, each: int, rng: np.random.Generator) -> Pairs:
+    """Tracks with so many random plots each."""
+    row = np.repeat(np.arange(tracks), each)
+    return pairs(tracks, plots, row, rng.integers(0, plots, row.size), rng)
+
+
+def pairs(tracks: int, plots: int, row: Ints, column: Ints, rng: np.random.Generator) -> Pairs:
+    return np.full(tracks, 1.0 - P_D * P_G), plots, row, column, np.exp(rng.normal(size=row.size))
+
+
+def sparse_cases(seed: int) -> Iterator[tuple[str, Pairs]]:
+    """Up to a million pairs whose matrices would not fit in memory; most where it costs most for its size."""
+    rng = np.random.default_rng((seed, 1_000_000))
+    for size, mixed in ((2, False), (3, False), (3, True), (8, False), (32, False), (32, True)):
+        name = f"clusters {size} × {size}, a million pairs" + ", mixed" * mixed
+        yield name, side_by_side(1_000_000 // size**2, size, size, rng, mixed)
+    chain = np.repeat(np.arange(500_000), 2)
+    yield "chain, a million pairs", pairs(500_000, 500_001, chain, chain + np.arange(chain.size) % 2, rng)
+    yield "300,000 tracks, 3 random plots each", at_random(300_000, 300_000, 3, rng)
+    yield "500,000 tracks, 2 random plots each", at_random(500_000, 500_000, 2, rng)
+    alone = np.arange(1_000_000)
+    yield "a million tracks, one plot each", pairs(1_000_000, 1_000_000, alone, alone.copy(), rng)
+    for size, count in ((2, 200_000), (3, 200_000)):  # as many as are summed exactly
+        yield f"clusters {size} × {size}, {count:,} pairs", side_by_side(count // size**2, size, size, rng)
+    yield (
+        "chain, 300,000 pairs",
+        pairs(150_000, 150_001, chain[:300_000], chain[:300_000] + np.arange(300_000) % 2, rng),
+    )
+    yield "250,000 tracks, 2 of a million plots each", at_random(250_000, 1_000_000, 2, rng)
+
+
 def timed(call: Callable[[], Any], seconds: float) -> list[float]:
     """Wall times of repeated calls, ms, over about so many seconds; the first, uncounted, compiles."""
     call()
@@ -185,6 +235,18 @@ def measure(case: Case, peer: Callable[[Array], Array] | None, seconds: float) -
     )  # fmt: skip
 
 
+def measure_sparse(name: str, problem: Pairs, seconds: float) -> Figure:
+    """The sparse call alone; `read` is one reading of the pairs."""
+    miss, plots, row, column, values = problem
+    rough = float(np.mean(jpda.sparse(*problem).approximate))
+    read = timed(lambda: row.sum() + column.sum() + values.sum(), seconds)
+    sparse = timed(lambda: jpda.sparse(*problem), seconds)
+    return Figure(
+        name, len(miss), plots, len(row), statistics.median(read), math.nan, math.nan,
+        statistics.median(sparse), math.nan, rough, math.nan, math.nan,
+    )  # fmt: skip
+
+
 def table(figures: list[Figure]) -> str:
     lines = [
         "| case | pairs | read, ms | dense, ms | slowest | sparse, ms | pyehm, ms | pyehm / dense | rough "
@@ -211,6 +273,11 @@ def main() -> None:
         print("pyehm is not installed: its column stays empty\n")
     chosen = (case for case in cases(arguments.seed) if arguments.only in case.name)
     figures = [measure(case, peer, arguments.seconds) for case in chosen]
+    figures += [
+        measure_sparse(name, problem, arguments.seconds)
+        for name, problem in sparse_cases(arguments.seed)
+        if arguments.only in name
+    ]
     print(table(figures))
     if arguments.json:
         arguments.json.write_text(json.dumps([asdict(f) for f in figures], indent=2) + "\n")

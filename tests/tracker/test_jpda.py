@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from radar_console.tracker.association import jpda
+from radar_console.tracker.association import elimination, grouping, jpda, pairs
 
 
 def enumerate_events(likelihood):
@@ -305,3 +305,106 @@ def test_a_cluster_is_not_charged_for_the_search_of_the_one_before():
     approximate = jpda.sparse(miss, columns[-1], row, col, w, 2e5).approximate
     assert approximate[:12].all()
     assert not approximate[12:].any()
+
+
+def pairs_of(blocks):
+    """The sparse problem of several dense ones side by side: miss, columns, row, col, w."""
+    shapes = np.array([(0, 0), *((len(b), b.shape[1] - 1) for b in blocks)])
+    tracks, columns = np.cumsum(shapes, axis=0).T
+    places = [np.nonzero(b[:, 1:]) for b in blocks]
+    row = np.concatenate([r + t for (r, _), t in zip(places, tracks, strict=False)])
+    col = np.concatenate([c + k for (_, c), k in zip(places, columns, strict=False)])
+    w = np.concatenate([b[:, 1:][place] for b, place in zip(blocks, places, strict=True)])
+    return np.concatenate([b[:, 0] for b in blocks]), int(columns[-1]), row, col, w
+
+
+def shuffled(problem, rng):
+    """The same problem in another order of tracks and plots; each track's new place, each pair's old one."""
+    miss, columns, row, col, w = problem
+    track, plot = rng.permutation(len(miss)), rng.permutation(columns)
+    order = np.argsort(track[row], kind="stable")
+    mixed = np.empty_like(miss)
+    mixed[track] = miss
+    return (mixed, columns, track[row][order], plot[col][order], w[order]), track, order
+
+
+@settings(max_examples=200, derandomize=True)
+@given(st.integers(0, 2**32 - 1), st.integers(1, 6), st.sampled_from([0.0, 1.0, 6.0, 60.0]), st.booleans())
+def test_two_tracks_are_what_the_enumeration_says(seed, plots, spread, all_shared):
+    """Up to four common plots the sum is written out, with and without plots of one track besides."""
+    likelihood = random_cluster(seed, 2, plots, 1.0 if all_shared else 0.7, spread)
+    found = jpda.marginals(likelihood)
+    assert np.abs(found - enumerate_events(likelihood)).max() <= 1e-12
+
+
+@pytest.mark.parametrize("plots", [1, 2, 3, 4])
+def test_two_tracks_cost_what_their_plan_costs(plots):
+    """So that what is exact does not depend on how it is summed."""
+    cluster = grouping.room(plots + 2, 2 * plots)
+    every = pairs.Side(np.array([0, plots, 2 * plots]), np.tile(np.arange(plots), 2), np.ones(2 * plots))
+    claims, number = np.full(plots, 2, np.uint8), np.zeros(plots, np.int32)
+    assert grouping.gather(np.arange(2), every, claims, number, cluster) == plots
+    work = elimination.work(plots + 2, 2 * plots)
+    cost, _, looked = elimination.plan(np.arange(2), cluster.tracks, cluster.plots, 1e9, 1e9, work)
+    assert elimination.price_of_two(plots) == (cost, looked)
+
+
+def test_many_small_clusters_in_any_order():
+    """More plots than fit a cache, clusters of all small shapes mixed: each is what the enumeration says."""
+    rng = np.random.default_rng(9)
+    kinds = [random_cluster(seed, *rng.integers(1, 5, 2), 0.8, 2.0) for seed in range(40)]
+    kinds.append(
+        random_cluster(1, 30, 1, 1.0, 1.0)
+    )  # many tracks, one plot: more tracks than half of the pairs
+    which = rng.integers(0, len(kinds), 8000)
+    problem, track, order = shuffled(pairs_of([kinds[k] for k in which]), rng)
+    assert problem[1] > grouping.FAR
+    found = jpda.sparse(*problem, budget=1e9)
+    assert not found.approximate.any()
+    exact = {k: enumerate_events(kinds[k]) for k in range(40)}
+    star = kinds[40][:, 1] / kinds[40][:, 0]
+    share = star / (1.0 + star.sum())  # one plot, one event for each track
+    exact[40] = np.stack([1.0 - share, share], axis=1)
+    p_miss = np.concatenate([exact[k][:, 0] for k in which])
+    p = np.concatenate([exact[k][:, 1:][kinds[k][:, 1:] > 0] for k in which])
+    assert np.abs(found.p_miss[track] - p_miss).max() <= 1e-12
+    assert np.abs(found.p - p[order]).max() <= 1e-12
+
+
+@pytest.mark.parametrize("certain", [False, True])
+def test_one_sweep_over_all_is_what_it_is_over_each(certain):
+    """So many pairs that belief propagation goes over them once: the plain formulas of Williams and Lau."""
+    rng = np.random.default_rng(11)
+    tracks, plots, many = 3, 4, 60_000
+    w = np.exp(rng.normal(size=(many, tracks, plots)))
+    w[:, 0, 0] = 0.0
+    w[:, 1:, 1] = 0.0  # a plot of the first track alone
+    miss = np.full((many, tracks, 1), 1e-9 if certain else 0.1)
+    problem = pairs_of(list(np.concatenate([miss, w], axis=2)))
+    found = jpda.sparse(*problem, budget=16.0 * np.count_nonzero(w[:, :, [0, 2, 3]]))
+    assert found.approximate.all()
+    r = w / miss
+    told = r / (1.0 + r.sum(axis=2, keepdims=True) - r)
+    weight = r / (1.0 + told.sum(axis=1, keepdims=True) - told)
+    p = weight / (1.0 + weight.sum(axis=2, keepdims=True))
+    p /= np.maximum(p.sum(axis=1, keepdims=True), 1.0)
+    # The first track's own plot takes its share of what the others leave.
+    rest = 1.0 - p[:, 0, 2:].sum(axis=1)
+    p[:, 0, 1] = rest * r[:, 0, 1] / (1.0 + r[:, 0, 1])
+    np.testing.assert_allclose(found.p, p[w > 0], atol=1e-9)
+    p_miss = 1.0 - p.sum(axis=2)
+    np.testing.assert_allclose(found.p_miss.reshape(many, tracks), p_miss, atol=1e-9)
+
+
+def test_a_hopeless_cluster_leaves_nothing_for_the_next():
+    """What can't be afforded is not begun; what follows is approximated, as after a plan that failed."""
+    rng = np.random.default_rng(4)
+    n = 2000
+    ring = np.zeros((n, n + 1))
+    ring[:, 0] = 0.1
+    for step in (0, 1, 7):
+        ring[np.arange(n), 1 + (np.arange(n) + step) % n] = rng.uniform(0.5, 2.0, n)
+    problem = pairs_of([ring, random_cluster(1, 2, 2, 1.0, 1.0)])
+    left = 5e3
+    found = jpda.sparse(*problem, budget=16.0 * len(problem[2]) + left)
+    assert found.approximate.all()

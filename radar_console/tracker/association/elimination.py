@@ -17,7 +17,9 @@ import numpy as np
 from numba import njit
 
 from radar_console.estimation.gaussian import Array
+from radar_console.tracker.association.grouping import Cluster
 from radar_console.tracker.association.pairs import Ints, Side
+from radar_console.tracker.kernels import inlined
 
 WIDEST = 24
 """Live columns beyond which no plan is made: 2^24 numbers for each row."""
@@ -44,22 +46,23 @@ _NEW, _NEAR, _DONE = 0, 1, 2
 @njit(cache=True, nogil=True)
 def work(members: int, pairs: int) -> Work:
     """Scratch for up to so many members of one side, and pairs."""
-    n = members + 2
+    n = members + 1
+    whole = np.empty(9 * n + pairs, np.int64)
     return Work(
-        np.empty(n, np.int64),
-        np.full(n, -1, np.int64),
-        np.empty(n, np.int64),
-        np.zeros(n, np.int64),
-        np.empty(n, np.int64),
-        np.empty(n, np.int64),
-        np.empty(n, np.int64),
-        np.empty(pairs, np.int64),
-        np.empty(n, np.int64),
-        np.empty(n, np.int64),
+        whole[:n],
+        whole[n : 2 * n],
+        whole[2 * n : 3 * n],
+        whole[3 * n : 4 * n],
+        whole[4 * n : 5 * n],
+        whole[5 * n : 6 * n],
+        whole[6 * n : 7 * n],
+        whole[9 * n :],
+        whole[7 * n : 8 * n],
+        whole[8 * n : 9 * n],
     )
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@inlined
 def plan(
     members: Ints, rows: Side, columns: Side, ceiling: float, patience: float, work: Work
 ) -> tuple[float, int, float]:
@@ -119,7 +122,35 @@ def plan(
     return steps + looked, stored + 3 * (1 << peak), looked
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@inlined
+def price_of_two(plots: int) -> tuple[float, float]:
+    """Of two tracks that share so many plots, as `plan` has it: steps of plan and sum, of the plan alone."""
+    looked = 2.0 + 2.0 * plots
+    return looked + (plots + 2.0 + (plots + 4.0) * (1 << plots)), looked
+
+
+@inlined
+def add_up_two(plots: int, cluster: Cluster) -> None:
+    """Turn the ratios of two tracks that share all their plots into probabilities: the sum, written out.
+
+    A track has plot i with weight r_i (1 + the other track's ratios of other plots): no differences.
+    """
+    ratio, r = cluster.tracks.ratio, cluster.plots.ratio
+    total = 1.0
+    for i in range(plots):
+        rest, rest2 = 1.0, 1.0
+        for j in range(plots):
+            if j != i:
+                rest += r[2 * j]
+                rest2 += r[2 * j + 1]
+        ratio[cluster.place[2 * i]] = r[2 * i] * rest2
+        ratio[cluster.place[2 * i + 1]] = r[2 * i + 1] * rest
+        total += r[2 * i] * rest2 + r[2 * i + 1]
+    for k in range(2 * plots):
+        ratio[k] /= total
+
+
+@inlined
 def _lay_out(rows_count: int, rows: Side, columns: Side, work: Work) -> int:
     """Positions of the columns at every row of `work.order`; the highest width."""
     left, place, line = work.left, work.place, work.line
@@ -161,7 +192,7 @@ def add_up(rows_count: int, rows: Side, columns: Side, work: Work, store: Array)
     return tables
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@inlined
 def _sum_forward(rows_count: int, rows: Side, work: Work, tables: Array) -> int:
     """Fill `tables` with the sums before each row, and where the last one, of all rows, begins."""
     tables[0] = 1.0
@@ -185,7 +216,7 @@ def _sum_forward(rows_count: int, rows: Side, work: Work, tables: Array) -> int:
     return begin
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@inlined
 def eliminate(rows_count: int, rows: Side, columns: Side, work: Work, store: Array) -> None:
     """Turn the ratios of the rows of `work.order` into probabilities; `store` is as large as `plan` said."""
     peak = _lay_out(rows_count, rows, columns, work)

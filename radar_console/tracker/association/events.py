@@ -14,7 +14,8 @@ from numpy.typing import NDArray
 
 from radar_console.estimation import draws
 from radar_console.estimation.gaussian import Array
-from radar_console.tracker.association import elimination, jpda, pairs
+from radar_console.tracker.association import elimination, grouping, pairs
+from radar_console.tracker.association.grouping import Claims
 from radar_console.tracker.association.pairs import Ints, Side
 
 NOTHING = -1
@@ -22,7 +23,7 @@ NOTHING = -1
 
 _mix, _uniforms = draws.mix, draws.uniforms
 _starts, _divide = pairs.starts, pairs.divide
-_shared, _by_plot, _components = jpda.shared, jpda.arranged, jpda.components
+_count_claims, _by_plot, _components = grouping.count_claims, grouping.arranged, grouping.components
 Work = elimination.Work
 _work, _plan, _add_up = elimination.work, elimination.plan, elimination.add_up
 
@@ -50,18 +51,14 @@ def draw(
     """
     tracks, count = miss.size, choice.shape[1]
     known[:] = False
-    first, ratio, claims = _starts(tracks, row), np.empty(row.size), np.zeros(columns, np.int64)
+    first, ratio = _starts(tracks, row), np.empty(row.size)
     _divide(miss, first, w, ratio)
-    for k in range(row.size):
-        claims[col[k]] += 1
-    common = 0
-    for c in range(columns):
-        common += claims[c] if claims[c] > 1 else 0
+    claims, common = _count_claims(col, columns)
     if common == 0:
         return
     by_track, free = _shared(first, col, ratio, claims, common)
-    by_plot, _ = _by_plot(by_track, columns)
-    members, begin = _components(by_track, columns)
+    by_plot = _by_plot(by_track, columns)
+    members, begin, _ = _components(by_track, claims)
     work = _work(max(tracks, columns), by_track.other.size)
     lot = np.empty(count, np.float32)
     for g in range(begin.size - 1):
@@ -84,6 +81,29 @@ def draw(
             _go_back(n, tables[end : end + size], by_track, work, lot, state, choice[t])
             _name(t, by_track, col, claims, ratio, free[t], first, lot, choice[t])
             known[t] = True
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _shared(start: Ints, col: Ints, ratio: Array, claims: Claims, count: int) -> tuple[Side, Array]:
+    """The `count` pairs of plots that several tracks gate, their ratios to its miss and own plots together.
+
+    Also returns that weight `free` (tracks,) of miss and own plots.
+    """
+    tracks = start.size - 1
+    free = np.ones(tracks)
+    # One place more: each pair is written, and overwritten by the next unless it is shared.
+    begin, other, rest = np.zeros(tracks + 1, np.int64), np.empty(count + 1, np.int64), np.empty(count + 1)
+    n = 0
+    for t in range(tracks):
+        for k in range(start[t], start[t + 1]):
+            own = claims[col[k]] == 1
+            other[n], rest[n] = col[k], ratio[k]
+            n += not own
+            free[t] += ratio[k] if own else 0.0
+        begin[t + 1] = n
+        for k in range(begin[t], n):
+            rest[k] /= free[t]
+    return Side(begin, other[:count], rest[:count]), free
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -145,7 +165,7 @@ def _go_back(n: int, now: Array, rows: Side, work: Work, lot: Any, state: Ints, 
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def _name(
-    t: int, rows: Side, col: Ints, claims: Ints, ratio: Array, free: float, first: Ints, lot: Any,
+    t: int, rows: Side, col: Ints, claims: Claims, ratio: Array, free: float, first: Ints, lot: Any,
     choice: Choices,
 ) -> None:  # fmt: skip
     """Turn places among a track's shared pairs into places among all; draw what no shared plot stands for.

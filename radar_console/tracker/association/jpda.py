@@ -16,8 +16,10 @@ from numba import njit
 from numpy.typing import NDArray
 
 from radar_console.estimation.gaussian import Array
-from radar_console.tracker.association import elimination, pairs, propagation
+from radar_console.tracker.association import elimination, grouping, pairs, propagation
+from radar_console.tracker.association.grouping import Claims, Cluster, Places
 from radar_console.tracker.association.pairs import Ints, Side
+from radar_console.tracker.kernels import bare, inlined
 
 BUDGET = 8.0e6
 """Steps of one call, about 1 ns each, beyond which clusters are approximated.
@@ -33,12 +35,22 @@ _BLOCK = 128  # weights of a dense row that are looked at together; less than 25
 _INDEX = np.dtype(np.int64)
 _CHECKED = 512  # pairs that are checked together
 _PASS, _TRACK, _LOOK = 16.0, 30.0, 3.0  # steps that a pair, a track and a look in a plan take besides
+_PAIRWISE = 4  # plots, up to which the sum of two tracks is written out; no second plan is made there
+_USUAL = 256  # pairs of a cluster; for larger ones room is made when they come
+_FEW = 4  # sweeps that cost less than to look for clusters
 _CHEAP = 256.0  # steps for which it is not worth while to look for a cheaper way
 
 _starts, _divide, find = pairs.starts, pairs.divide, pairs.find
+_FAR, _AHEAD = grouping.FAR, grouping.AHEAD
+_count_claims, _components, _room, _touch, _gather = (
+    grouping.count_claims, grouping.components, grouping.room, grouping.touch, grouping.gather,
+)  # fmt: skip
 _work, _plan, _eliminate = elimination.work, elimination.plan, elimination.eliminate
+_price_of_two, _add_up_two = elimination.price_of_two, elimination.add_up_two
 _WIDEST = elimination.WIDEST
-_messages, _propagate, _propagate_all = propagation.messages, propagation.propagate, propagation.propagate_all
+_messages, _propagate, _propagate_once, _propagate_all = (
+    propagation.messages, propagation.propagate, propagation.propagate_once, propagation.propagate_all,
+)  # fmt: skip
 
 
 class Marginals(NamedTuple):
@@ -104,13 +116,22 @@ def _sound(miss: Array, columns: int, row: Ints, col: Ints, w: Array) -> bool:
     for t in range(miss.size):
         if not 0.0 <= miss[t] < math.inf:
             return False
+    # In vectors, as fast as memory delivers. Of the integers only signs are collected: differences do not
+    # overflow before something is negative.
+    highest, sign = columns - 1, 0
     for begin in range(0, row.size, _CHECKED):
-        end, good = min(begin + _CHECKED, row.size), 0
-        for k in range(begin, end):  # without a branch, in vectors
-            good += (0 <= col[k]) & (col[k] < columns) & (w[k] >= 0.0) & (w[k] < math.inf)
-        for k in range(max(begin, 1), end):
-            good -= row[k - 1] > row[k]
-        if good < end - begin:
+        r, c, x = (
+            row[max(begin - 1, 0) : begin + _CHECKED],
+            col[begin : begin + _CHECKED],
+            w[begin : begin + _CHECKED],
+        )
+        for k in range(1, r.size):
+            sign |= r[k] | (r[k] - r[k - 1])
+        unsound = 0
+        for k in range(x.size):
+            sign |= c[k] | (highest - c[k])
+            unsound += not ((x[k] >= 0.0) & (x[k] < math.inf))
+        if sign < 0 or unsound > 0:
             return False
     return True
 
@@ -197,37 +218,75 @@ def _solve(
 ) -> None:
     """`solve` for pairs start[t]:start[t + 1] of each track t; `p` may be `w`.
 
-    Up to a million pairs, fresh memory and another pass cost as much as a sweep: hence what is done in place.
+    `approximate` are at first all tracks that share plots; those leave whom the exact sums reach. Up to a
+    million pairs, fresh memory and another pass cost as much as a sweep: hence what is done in place.
     """
-    approximate[:] = False
     _divide(miss, start, w, p)
-    claims = np.zeros(columns, np.int64)
-    for k in range(col.size):
-        claims[col[k]] += 1
-    count = 0
-    for c in range(columns):
-        count += int(claims[c]) if claims[c] > 1 else 0
-    # All pairs as they are where there are no others, or so many that they are to be approximated: belief
-    # propagation needs no folding.
-    if count == col.size or _PASS * count > budget:
-        every = Side(start, col, p)
-        _clusters(every, claims, budget, approximate)
-        for t in range(miss.size):
-            p_miss[t] = _rest(p[start[t] : start[t + 1]])
+    every = Side(start, col, p)
+    claims, count = _count_claims(col, columns)
+    sharing = _set_apart(every, claims, p_miss, approximate)
+    if sharing == 0:
         return
-    by_track, free = shared(start, col, p, claims, count)
-    _clusters(by_track, claims, budget, approximate)
-    n = 0
-    for t in range(miss.size):
-        rest = _rest(by_track.ratio[by_track.start[t] : by_track.start[t + 1]])
-        rest /= free[t]  # of the track's miss; its own plots take their shares of it
-        p_miss[t] = rest
-        for k in range(start[t], start[t + 1]):
-            if claims[col[k]] == 1:
-                p[k] *= rest
-            else:
-                p[k] = by_track.ratio[n]
-                n += 1
+    left, sweeps = budget - _PASS * count, _sweeps(count, sharing)
+    folded = left >= 0.0
+    if not folded:
+        sweeps = _sweeps(col.size, _with_pairs(start))
+    elif _too_wide(every, claims):
+        left = 0.0
+    if left > 0.0 or sweeps > _FEW:
+        members, begin, number = _components(every, claims)
+        if left > 0.0:
+            _add_up_clusters(members, begin, every, claims, count, number, left, p_miss, approximate)
+        if sweeps > _FEW:
+            _propagate_clusters(members, begin, every, claims, folded, sweeps, p_miss, approximate)
+            return
+    if sweeps > 1:
+        _propagate_rest(every, claims, folded, sweeps, p_miss, approximate)
+    elif np.any(approximate):
+        _propagate_once(every, claims, folded, approximate, p_miss)
+
+
+@bare
+def _set_apart(every: Side, claims: Claims, p_miss: Array, approximate: Any) -> int:
+    """Give the tracks that share no plot their probabilities; mark the others, and say how many."""
+    sharing = 0
+    for t in range(approximate.size):
+        k, end, free = every.start[t], every.start[t + 1], 1.0
+        while k < end and claims[every.other[k]] == 1:
+            free += every.ratio[k]
+            k += 1
+        approximate[t] = k < end
+        sharing += k < end
+        if k == end:
+            _leave(t, every, free, p_miss)
+    return sharing
+
+
+@bare
+def _leave(t: int, every: Side, free: float, p_miss: Array) -> None:
+    """Of a track that shares no plot: the probabilities, of ratios that make `free` with the miss's 1."""
+    rest = 1.0 / free
+    p_miss[t] = rest
+    for k in range(every.start[t], every.start[t + 1]):
+        every.ratio[k] *= rest
+
+
+@bare
+def _leave_alone(t: int, every: Side, p_miss: Array, approximate: Any) -> None:
+    """The same of the only track of a cluster: a plot was given twice."""
+    free = 1.0
+    for k in range(every.start[t], every.start[t + 1]):
+        free += every.ratio[k]
+    _leave(t, every, free, p_miss)
+    approximate[t] = False
+
+
+@njit(cache=True, nogil=True)
+def _with_pairs(start: Ints) -> int:
+    count = 0
+    for t in range(start.size - 1):
+        count += start[t + 1] > start[t]
+    return count
 
 
 @njit(cache=True, nogil=True, fastmath={"reassoc", "nsz"})
@@ -240,124 +299,151 @@ def _rest(p: Array) -> float:
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def shared(start: Ints, col: Ints, ratio: Array, claims: Ints, count: int) -> tuple[Side, Array]:
-    """The `count` pairs of plots that several tracks gate, their ratios to its miss and own plots together.
+def _propagate_rest(
+    every: Side, claims: Claims, folded: bool, sweeps: int, p_miss: Array, approximate: Any
+) -> None:
+    """Belief propagation over all tracks that are `approximate`, as if they were one cluster.
 
-    Also returns that weight `free` (tracks,) of miss and own plots.
+    They need no folding.
     """
-    tracks = start.size - 1
-    free = np.ones(tracks)
-    # One place more: each pair is written, and overwritten by the next unless it is shared.
-    begin, other, rest = np.zeros(tracks + 1, np.int64), np.empty(count + 1, np.int64), np.empty(count + 1)
-    n = 0
-    for t in range(tracks):
-        for k in range(start[t], start[t + 1]):
-            own = claims[col[k]] == 1
-            other[n], rest[n] = col[k], ratio[k]
-            n += not own
-            free[t] += ratio[k] if own else 0.0
-        begin[t + 1] = n
-        for k in range(begin[t], n):
-            rest[k] /= free[t]
-    return Side(begin, other[:count], rest[:count]), free
-
-
-@njit(cache=True, nogil=True, error_model="numpy")
-def arranged(by_track: Side, columns: int) -> tuple[Side, Ints]:
-    """The same pairs by plot, and the place of each by track; of no `columns`, none."""
-    pairs = by_track.other.size if columns > 0 else 0
-    start = np.zeros(columns + 1, np.int64)
-    for c in by_track.other[:pairs]:
-        start[c + 1] += 1
-    for c in range(columns):
-        start[c + 1] += start[c]
-    fill = start[:-1].copy()
-    other, r, place = np.empty(pairs, np.int64), np.empty(pairs), np.empty(pairs, np.int64)
-    for t in range(by_track.start.size - 1 if pairs > 0 else 0):
-        for k in range(by_track.start[t], by_track.start[t + 1]):
-            n = fill[by_track.other[k]]
-            fill[by_track.other[k]] += 1
-            other[n], r[n], place[n] = t, by_track.ratio[k], k
-    return Side(start, other, r), place
-
-
-@njit(cache=True, nogil=True, error_model="numpy")
-def components(by_track: Side, columns: int) -> tuple[Ints, Ints]:
-    """Tracks that share plots, one component after the other, and where each begins."""
-    tracks = by_track.start.size - 1
-    parent, claimant = np.arange(tracks), np.full(columns, -1, np.int64)
-    for t in range(tracks):
-        for c in by_track.other[by_track.start[t] : by_track.start[t + 1]]:
-            if claimant[c] < 0:
-                claimant[c] = t
-            elif parent[t] != parent[claimant[c]]:
-                a, b = find(parent, t), find(parent, claimant[c])
-                parent[max(a, b)] = min(a, b)
-    size = np.zeros(tracks, np.int64)
-    for t in range(tracks):
-        parent[t] = find(parent, t)
-        size[parent[t]] += by_track.start[t + 1] > by_track.start[t]
-    begin, count, total = np.empty(tracks + 1, np.int64), 0, 0
-    for t in range(tracks):  # a root is the lowest of its tracks
-        if size[t] > 0:
-            begin[count] = total
-            count += 1
-            total, size[t] = total + size[t], total
-    begin[count] = total
-    members = np.empty(total, np.int64)
-    for t in range(tracks):
-        if by_track.start[t + 1] > by_track.start[t]:
-            members[size[parent[t]]] = t
-            size[parent[t]] += 1
-    return members, begin[: count + 1]
-
-
-@njit(cache=True, nogil=True, error_model="numpy")
-def _clusters(by_track: Side, claims: Ints, budget: float, approximate: Any) -> None:
-    """Turn the ratios into probabilities, cluster by cluster."""
-    pairs, tracks, columns = by_track.other.size, by_track.start.size - 1, claims.size
-    if pairs == 0:
+    tracks, plots = np.empty(approximate.size, np.int64), np.empty(claims.size, np.int64)
+    n = m = 0
+    for t in range(tracks.size):
+        if approximate[t]:
+            tracks[n] = t
+            n += 1
+    if n == 0:
         return
-    members, begin = components(by_track, columns)
-    left, sweeps = budget - _PASS * pairs, _sweeps(pairs, members.size)
-    if _too_wide(by_track, claims):
-        left = 0.0
-    by_plot, place = arranged(by_track, columns if left > 0.0 else 0)
-    work, work2 = _work(max(tracks, columns), pairs), _work(max(tracks, columns), pairs)
-    plots, listed = np.empty(columns, np.int64), np.zeros(columns, np.bool_)
-    store, scratch = np.empty(1024), _messages(by_track, 0)
+    for c in range(plots.size):
+        if claims[c] > 0:
+            plots[m] = c
+            m += 1
+    _propagate(tracks[:n], every, plots[:m], claims, folded, sweeps, _messages(every, claims.size), p_miss)
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _propagate_clusters(
+    members: Ints,
+    begin: Ints,
+    every: Side,
+    claims: Claims,
+    folded: bool,
+    sweeps: int,
+    p_miss: Array,
+    approximate: Any,
+) -> None:
+    """The same, cluster by cluster: each ends when its own messages have converged."""
+    plots, listed = np.empty(0, np.int64), np.empty(0, np.bool_)
+    scratch = _messages(every, 0)
     for g in range(begin.size - 1):
         group = members[begin[g] : begin[g + 1]]
-        if group.size == 1:
-            alone = by_track.ratio[by_track.start[group[0]] : by_track.start[group[0] + 1]]
-            alone /= 1.0 + alone.sum()
+        if not approximate[group[0]]:
             continue
-        n = _list_plots(group, by_track, listed, plots)
-        cost, cost2, room, room2, looked2, spent = math.inf, math.inf, 0, 0, 0.0, 0.0
-        if left > 0.0:
-            patience = 0.5 * left / _LOOK
-            cost, room, looked = _plan(group, by_track, by_plot, left, patience, work)
-            if cost > _CHEAP:
-                cost2, room2, looked2 = _plan(plots[:n], by_plot, by_track, min(left, cost), patience, work2)
-            spent = _TRACK * group.size + _LOOK * (looked + looked2)
+        if group.size == 1:
+            _leave_alone(group[0], every, p_miss, approximate)
+            continue
+        if plots.size == 0:
+            plots, listed = np.empty(claims.size, np.int64), np.zeros(claims.size, np.bool_)
+            scratch = _messages(every, claims.size)
+        n = _list_plots(group, every, listed, plots)
+        _propagate(group, every, plots[:n], claims, folded, sweeps, scratch, p_miss)
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _add_up_clusters(
+    members: Ints,
+    begin: Ints,
+    every: Side,
+    claims: Claims,
+    count: int,
+    number: Places,
+    left: float,
+    p_miss: Array,
+    approximate: Any,
+) -> None:
+    """Sum the clusters exactly, for which the steps that are `left` suffice; they are not `approximate`."""
+    size = min(count, _USUAL)
+    most = size  # tracks, or plots; of these each has two pairs or more
+    cluster, work, work2 = _room(most, size), _work(most, size), _work(most, size)
+    ordinal, store = np.arange(most), np.empty(1024)
+    touched, ahead = np.empty(1), 0
+    for g in range(begin.size - 1):
+        if begin[g + 1] - begin[g] == 1:
+            _leave_alone(members[begin[g]], every, p_miss, approximate)
+            continue
+        if left <= 0.0:
+            continue
+        group = members[begin[g] : begin[g + 1]]
+        if claims.size > _FAR and begin[g + 1] > ahead:
+            touched[0] = _touch(members, begin[g], every, claims, number)
+            ahead = begin[g] + _AHEAD
+        needed = 0
+        for t in group:
+            needed += every.start[t + 1] - every.start[t]
+        patience = 0.5 * left / _LOOK
+        if needed > patience and _TRACK * group.size >= left and _shared(group, every, claims) > patience:
+            left = 0.0  # a plan looks at each pair: both would fail, and to begin one costs what is left
+            continue
+        if needed > size or group.size > most:
+            size, most = max(needed, size), max(group.size, needed // 2, most)
+            cluster, work, work2 = _room(most, size), _work(most, size), _work(most, size)
+            ordinal = np.arange(most)
+        by_track, by_plot = cluster.tracks, cluster.plots
+        n = _gather(group, every, claims, number, cluster)
+        if group.size == 2 and n <= _PAIRWISE and by_plot.start[n] == 2 * n:
+            cost, looked = _price_of_two(n)
+            if cost <= left and looked <= patience:
+                left -= 2.0 * _TRACK + _LOOK * looked + cost
+                _add_up_two(n, cluster)
+                _hand_out(group, every, claims, cluster, p_miss, approximate)
+                continue
+        cost2, room2, looked2 = math.inf, 0, 0.0
+        cost, room, looked = _plan(ordinal[: group.size], by_track, by_plot, left, patience, work)
+        if cost > _CHEAP:
+            cost2, room2, looked2 = _plan(ordinal[:n], by_plot, by_track, min(left, cost), patience, work2)
+        spent = _TRACK * group.size + _LOOK * (looked + looked2)
         if min(cost, cost2) > left:
             left -= spent
-            if scratch.heard.size == 0:
-                scratch = _messages(by_track, columns)
-            _propagate(group, by_track, plots[:n], sweeps, scratch)
-            for t in group:
-                approximate[t] = True
             continue
         left -= spent + min(cost, cost2)
         if max(room, room2) > store.size:
             store = np.empty(max(room, room2))
         if cost <= cost2:
             _eliminate(group.size, by_track, by_plot, work, store)
-            continue
-        _eliminate(n, by_plot, by_track, work2, store)
-        for c in plots[:n]:
-            for k in range(by_plot.start[c], by_plot.start[c + 1]):
-                by_track.ratio[place[k]] = by_plot.ratio[k]
+        else:
+            _eliminate(n, by_plot, by_track, work2, store)
+            for k in range(by_plot.start[n]):
+                by_track.ratio[cluster.place[k]] = by_plot.ratio[k]
+        _hand_out(group, every, claims, cluster, p_miss, approximate)
+
+
+@inlined
+def _shared(group: Ints, every: Side, claims: Claims) -> int:
+    """Pairs of a cluster, without those of plots of one track."""
+    count = 0
+    for t in group:
+        for k in range(every.start[t], every.start[t + 1]):
+            count += claims[every.other[k]] > 1
+    return count
+
+
+@inlined
+def _hand_out(
+    group: Ints, every: Side, claims: Claims, cluster: Cluster, p_miss: Array, approximate: Any
+) -> None:
+    """Write the probabilities of a cluster to its pairs and tracks."""
+    n = 0
+    for i in range(group.size):
+        t = group[i]
+        rest = _rest(cluster.tracks.ratio[cluster.tracks.start[i] : cluster.tracks.start[i + 1]])
+        rest /= cluster.free[i]  # of the track's miss; its own plots take their shares of it
+        p_miss[t], approximate[t] = rest, False
+        for k in range(every.start[t], every.start[t + 1]):
+            if claims[every.other[k]] == 1:
+                every.ratio[k] *= rest
+            else:
+                every.ratio[k] = cluster.tracks.ratio[n]
+                n += 1
 
 
 @njit(cache=True, nogil=True)
@@ -367,10 +453,15 @@ def _sweeps(pairs: int, tracks: int) -> int:
 
 
 @njit(cache=True, nogil=True)
-def _too_wide(by_track: Side, claims: Ints) -> bool:
+def _too_wide(every: Side, claims: Claims) -> bool:
     """Every track and every plot alone makes more columns live than the exact sum can have."""
-    for t in range(by_track.start.size - 1):
-        if 0 < by_track.start[t + 1] - by_track.start[t] <= _WIDEST:
+    for t in range(every.start.size - 1):
+        shared = 0
+        for k in range(every.start[t], every.start[t + 1]):
+            shared += claims[every.other[k]] > 1
+            if shared > _WIDEST:
+                break
+        if 0 < shared <= _WIDEST:
             return False
     narrow = 0
     for c in range(claims.size):

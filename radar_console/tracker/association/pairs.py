@@ -5,7 +5,7 @@ lies in the gate of track `row` with weight w. An associator fills `p` (pairs,),
 pair, `p_miss` (tracks,), and `approximate` (tracks,), where it had to approximate.
 """
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numba import njit
@@ -18,6 +18,8 @@ Ints = NDArray[np.int64]
 LEAST_MISS = 1e-30
 """Of a track's largest weight: keeps a certain detection (P_D P_G = 1, a miss of weight 0) divisible."""
 
+SHORT = 8
+"""Pairs of a track, up to which loops in vectors cost more than they gain."""
 
 _LEAP = 32  # pairs of one track that are passed over at once
 
@@ -57,16 +59,31 @@ def starts(tracks: int, row: Ints) -> Ints:
 def divide(miss: Array, start: Ints, w: Array, ratio: Array) -> None:
     """Fill `ratio` (pairs,) with weight over the track's miss weight, at most 1 / LEAST_MISS; may be `w`."""
     for t in range(miss.size):
-        gate, r = w[start[t] : start[t + 1]], ratio[start[t] : start[t + 1]]
-        largest = miss[t]
+        begin, end, m = start[t], start[t + 1], miss[t]
+        largest = m
+        if end - begin <= SHORT:
+            for k in range(begin, end):
+                largest = max(largest, w[k])
+            certain = m <= LEAST_MISS * largest
+            for k in range(begin, end):
+                ratio[k] = w[k] / m if not certain else _certain(w[k], largest)
+            continue
+        gate, r = w[begin:end], ratio[begin:end]
         for k in range(r.size):
             r[k] = gate[k]
             largest = max(largest, r[k])
-        if largest == 0.0:
-            continue
-        least = max(miss[t] / largest, LEAST_MISS)
-        for k in range(r.size):
-            r[k] = r[k] / largest / least  # two quotients: no overflow, no 0 / 0 below 1e-308
+        if m > LEAST_MISS * largest:
+            for k in range(r.size):
+                r[k] /= m
+        else:
+            for k in range(r.size):
+                r[k] = _certain(r[k], largest)
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _certain(w: float, largest: float) -> float:
+    """Ratio of a weight where the miss is as good as impossible: two quotients, no overflow."""
+    return w / largest / LEAST_MISS if largest > 0.0 else 0.0
 
 
 @njit(cache=True, nogil=True)
@@ -78,7 +95,7 @@ def ratios(miss: Array, row: Ints, w: Array) -> Array:
 
 
 @njit(cache=True, nogil=True)
-def find(parent: Ints, i: int) -> int:
+def find(parent: NDArray[np.signedinteger[Any]], i: int) -> int:
     """The root of `i`; shortens the path on the way."""
     while parent[i] != i:
         parent[i] = parent[parent[i]]

@@ -4,13 +4,15 @@ Source: Williams and Lau, Approximate evaluation of marginal association probabi
 propagation, IEEE T-AES 50(4), 2014, (24)-(26); it always converges (their theorem 1).
 """
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numba import njit
 
 from radar_console.estimation.gaussian import Array
-from radar_console.tracker.association.pairs import LEAST_MISS, Ints, Side
+from radar_console.tracker.association.grouping import Claims
+from radar_console.tracker.association.pairs import LEAST_MISS, SHORT, Ints, Side
+from radar_console.tracker.kernels import bare, inlined
 
 CLOSE = 1e-9
 """Relative change of what the plots hear below which the messages have converged."""
@@ -40,10 +42,12 @@ def messages(tracks: Side, plots: int) -> Messages:
     return Messages(np.empty(tracks.ratio.size), np.empty(plots), np.empty(plots), np.empty(widest))
 
 
-# Sums in any order, so that they run in vectors.
-@njit(cache=True, nogil=True, error_model="numpy", fastmath={"reassoc", "nsz"})
-def propagate(members: Ints, tracks: Side, plots: Ints, sweeps: int, scratch: Messages) -> bool:
-    """Turn the ratios of a cluster into probabilities; False if `sweeps` were too few to converge.
+@bare
+def propagate(
+    members: Ints, tracks: Side, plots: Ints, claims: Claims, folded: bool, sweeps: int, scratch: Messages,
+    p_miss: Array,
+) -> None:  # fmt: skip
+    """Turn the ratios of a cluster into probabilities, in at most so many sweeps, and fill its `p_miss`.
 
     A track tells a plot ratio / (1 + the sum over its other plots of ratio · message), a plot tells a
     track 1 / (1 + the sum over its other tracks of message). Only what the tracks told is kept: what a
@@ -52,54 +56,151 @@ def propagate(members: Ints, tracks: Side, plots: Ints, sweeps: int, scratch: Me
     Parameters
     ----------
     members, plots : tracks and plots of the cluster
+    claims : (columns,) pairs of each plot
+    folded : plots of one track count as a part of its miss, where others are used more than once
     """
     told, heard, hears, weight = scratch
     for j in plots:
         heard[j] = 1.0
-    converged = False
     for sweep in range(sweeps):
         for j in plots:
             hears[j] = 1.0
         for t in members:
-            begin, end = tracks.start[t], tracks.start[t + 1]
-            r, c, u = tracks.ratio[begin:end], tracks.other[begin:end], told[begin:end]
-            if sweep == 0:
-                _tell(r, r, _sum(r), u)
-            else:
-                _tell(r, weight, _weigh(r, c, u, heard, weight), u)
-            for k in range(r.size):
-                hears[c[k]] += u[k]
+            _speak(tracks.start[t], tracks.start[t + 1], tracks, sweep == 0, told, heard, hears, weight)
+        heard, hears = hears, heard
+        if sweep + 1 == sweeps:
+            break
         change = 0.0
         for j in plots:
-            change += abs(hears[j] - heard[j]) / hears[j]
-        heard, hears = hears, heard
+            change += abs(heard[j] - hears[j]) / heard[j]
         if change < CLOSE:
-            converged = True
             break
     used = hears
     for j in plots:
         used[j] = 0.0
     for t in members:
-        begin, end = tracks.start[t], tracks.start[t + 1]
-        r, c, u = tracks.ratio[begin:end], tracks.other[begin:end], told[begin:end]
-        total = _weigh(r, c, u, heard, weight)
-        for k in range(r.size):
-            r[k] = weight[k] / total
-        for k in range(r.size):
-            used[c[k]] += r[k]
+        p_miss[t] = _use(tracks.start[t], tracks.start[t + 1], tracks, told, heard, used, weight)
     for j in plots:
         # Messages that have not converged may use a plot more than once.
         used[j] = 1.0 / max(used[j], 1.0)
     for t in members:
-        r, c = (
-            tracks.ratio[tracks.start[t] : tracks.start[t + 1]],
-            tracks.other[tracks.start[t] : tracks.start[t + 1]],
-        )
+        _settle(t, tracks, used, claims, folded, p_miss)
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def propagate_once(tracks: Side, claims: Claims, folded: bool, among: Any, p_miss: Array) -> None:
+    """The same with one sweep, over all tracks that are `among` (tracks,) them; no messages are kept.
+
+    For hundreds of thousands of short tracks, which wait for memory. Of a track, d is the weight that is
+    left without the pair, r / d what it tells the plot, r / (heard - r / d) = r d / (heard d - r) the pair's
+    new weight.
+    """
+    plots = claims.size
+    heard, used = np.ones(plots), np.zeros(plots)
+    start, c, r = tracks
+    for t in range(among.size):
+        if among[t]:
+            total = 1.0
+            for k in range(start[t], start[t + 1]):
+                total += r[k]
+            for k in range(start[t], start[t + 1]):
+                heard[c[k]] += r[k] / max(total - r[k], 1.0)
+    for t in range(among.size):
+        if among[t]:
+            total, together = 1.0, 1.0
+            for k in range(start[t], start[t + 1]):
+                total += r[k]
+            for k in range(start[t], start[t + 1]):
+                d = max(total - r[k], 1.0)
+                r[k] *= d / max(heard[c[k]] * d - r[k], d)
+                together += r[k]
+            share = 1.0 / together
+            p_miss[t] = share
+            for k in range(start[t], start[t + 1]):
+                r[k] *= share
+                used[c[k]] += r[k]
+    for j in range(plots):
+        used[j] = 1.0 / max(used[j], 1.0)
+    for t in range(among.size):
+        if among[t]:
+            _settle(t, tracks, used, claims, folded, p_miss)
+
+
+@inlined
+def _speak(
+    begin: int, end: int, tracks: Side, first: bool, told: Array, heard: Array, hears: Array, weight: Array
+) -> None:
+    """A track's pairs begin:end tell their plots; in the first sweep all messages of plots are 1."""
+    r, c = tracks.ratio, tracks.other
+    if end - begin > SHORT:
+        r, c, u = r[begin:end], c[begin:end], told[begin:end]
+        if first:
+            _tell(r, r, _sum(r), u)
+        else:
+            _tell(r, weight, _weigh(r, c, u, heard, weight), u)
         for k in range(r.size):
-            r[k] *= used[c[k]]
-    return converged
+            hears[c[k]] += u[k]
+        return
+    total = 1.0
+    for k in range(begin, end):
+        w = r[k] if first else r[k] / max(heard[c[k]] - told[k], 1.0)
+        weight[k - begin] = w
+        total += w
+    for k in range(begin, end):
+        u = r[k] / max(total - weight[k - begin], 1.0)
+        told[k] = u
+        hears[c[k]] += u
 
 
+@inlined
+def _use(begin: int, end: int, tracks: Side, told: Array, heard: Array, used: Array, weight: Array) -> float:
+    """Turn the ratios of a track's pairs begin:end into probabilities, also added to `used`; the miss's."""
+    r, c = tracks.ratio, tracks.other
+    if end - begin > SHORT:
+        r, c = r[begin:end], c[begin:end]
+        total = _weigh(r, c, told[begin:end], heard, weight)
+        for k in range(r.size):
+            r[k] = weight[k] / total
+        for k in range(r.size):
+            used[c[k]] += r[k]
+        return 1.0 / total
+    total = 1.0
+    for k in range(begin, end):
+        w = r[k] / max(heard[c[k]] - told[k], 1.0)
+        weight[k - begin] = w
+        total += w
+    for k in range(begin, end):
+        p = weight[k - begin] / total
+        r[k] = p
+        used[c[k]] += p
+    return 1.0 / total
+
+
+@inlined
+def _settle(t: int, tracks: Side, used: Array, claims: Claims, folded: bool, p_miss: Array) -> None:
+    """Take from a track what is `used` more than once; give it to the miss and what is folded into it.
+
+    `used` (plots,) is the part of its probability that each plot keeps.
+    """
+    start, c, r = tracks
+    lost = 0.0
+    for k in range(start[t], start[t + 1]):
+        p = r[k] * used[c[k]]
+        lost += r[k] - p
+        r[k] = p
+    if not (folded and lost > 0.0):
+        p_miss[t] += lost
+        return
+    own = p_miss[t]
+    for k in range(start[t], start[t + 1]):
+        own += r[k] if claims[c[k]] == 1 else 0.0
+    more = 1.0 + lost / own
+    p_miss[t] *= more
+    for k in range(start[t], start[t + 1]):
+        r[k] *= more if claims[c[k]] == 1 else 1.0
+
+
+# Sums in any order, so that they run in vectors.
 @njit(cache=True, nogil=True, error_model="numpy", fastmath={"reassoc", "nsz"})
 def _sum(r: Array) -> float:
     """Of a track's ratios, with the miss's 1."""
