@@ -80,9 +80,8 @@ def components(by_track: Side, claims: Claims) -> tuple[Ints, Ints, Places]:
     size = np.zeros(tracks, np.int32)
     for t in range(tracks):
         if parent[t] >= 0:
-            parent[t] = parent[
-                parent[t]
-            ]  # a root is the lowest of its tracks: that parent has its root already
+            # A root is the lowest of its tracks: that parent has its root already.
+            parent[t] = parent[parent[t]]
             size[parent[t]] += 1
     begin, count, total = np.empty(tracks + 1, np.int64), 0, 0
     for t in range(tracks):
