@@ -17,7 +17,7 @@ longer than the crossing. Of each run:
   same plots; elsewhere there is room for the two tracks given, so that nothing disturbs swap and loss.
 
 Beside: the Kalman filter; GNN with a gate of 0.99
-in place of 0.9999; process noise for straight courses (1 in place of 30 m²/s³). What is due to the crossing
+in place of 0.999999; process noise for straight courses (1 in place of 30 m²/s³). What is due to the crossing
 is seen beside the same courses moved aside, 15 km apart at the least, and meeting at 0 m. Intervals are
 Wilson's, those of differences Newcombe's for the same runs.
 
