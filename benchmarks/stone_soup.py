@@ -8,7 +8,7 @@ probabilities times the weights that each alone would give.
 
 q, P_D and the clutter density are the scene's. Stone Soup takes one density in bearing and range, so it
 is that of the plane times the targets' mean range. The gate of 0.99 and the four hits of an initiation
-are chosen for it: with our 0.9999 its association of a formation took more than ten times as long, and
+are chosen for it: with 0.9999 its association of a formation took more than ten times as long, and
 with that gate and three hits ring25 had 32 false tracks after 13 scans. It works in kilometres:
 beside metres squared it takes the variance of a good azimuth for zero, and refuses the covariance.
 """

@@ -358,7 +358,7 @@ class TrackerSettings(Settings):
         Field(ge=0, lt=1, description="part of the centroids that err eight times as much as they claim"),
     ] = 0.05
     p_d: Annotated[Probability, Field(description="detection probability")] = 0.9
-    gate_probability: Annotated[float, Field(gt=0, lt=1)] = 0.9999
+    gate_probability: Annotated[float, Field(gt=0, lt=1)] = 0.999999
     clutter_per_km2: Annotated[
         NonNegative | None, Field(description="false centroids; without it, estimated live")
     ] = None

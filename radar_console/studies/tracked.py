@@ -28,6 +28,7 @@ _DISC = 3.0  # km, radius of the clutter around each target
 _SECTORS = 4  # of a turn: the fewest, as tracks do not depend on them
 _FIRST = TURN * (1.0 + 1e-9)  # rad, the end of the first turn
 _LEAST_DENSITY = 1e-3  # per km², that a tracker without clutter is told
+_GATE = 0.9999  # the probability of it: that of the figures in docs/studies.md
 
 
 class Scene(NamedTuple):
@@ -118,7 +119,7 @@ def follow(played: Played, settings: Mapping[str, Any], initiation: bool, seed: 
     seed : of the tracker
     """
     scene, given = played.scene, played.given
-    known: dict[str, Any] = {"clutter_per_km2": max(scene.density, _LEAST_DENSITY)}
+    known: dict[str, Any] = {"clutter_per_km2": max(scene.density, _LEAST_DENSITY), "gate_probability": _GATE}
     room = {} if initiation else {"max_tracks": len(given)}
     radar = played.sectors[0].radar
     tracker = Tracker(TrackerSettings(**(known | room | dict(settings))), radar, seed, threads=1)

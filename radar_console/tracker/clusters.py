@@ -31,11 +31,12 @@ from radar_console.tracker.records import (
 _find, _solve, _BUDGET = jpda.find, choose.associate, jpda.BUDGET
 _PDA, _JPDA, _SET_JPDA = choose.PDA, choose.JPDA, choose.SET_JPDA
 _advance, _log_likelihood, _update = filters.advance, filters.log_likelihood, filters.update
-_density_at, _MARGIN = clutter.density_at, gating.MARGIN
+_density_at, _doubted, _MARGIN = clutter.density_at, clutter.doubted, gating.MARGIN
 _height_factor, _update_height, _identity_factor = height.factor, height.update, identity.factor
 _serve = management.serve
 
 _PRUNE = 1e-3  # of the miss: a pair that is less likely is no pair
+_DENSITY_ERROR = 1.1  # by which clutter may be denser than its estimate, where a track's life is at stake
 
 
 @inlined
@@ -173,12 +174,13 @@ def _associate_alone(m: int, w: World) -> None:
     if m + 1 < size[N_MEMBERS]:
         end = w.members[m + 1].pairs
     miss = 1.0 - par.p_d * par.p_g
-    total, track.crowded = miss, False
+    total, proof, track.crowded = miss, miss, False
     for k in range(begin, end):
         pair = w.pairs[k]
         pair.w *= _relative_to_clutter(track, pool[pair.plot], par)
         if pair.w > _PRUNE * miss:
             total += pair.w
+            proof += _proof(pair.w, track, pool[pair.plot], par)
             _keep_pair(k, member, w)
     for k in range(begin, begin + member.kept):
         pair = w.pairs[k]
@@ -188,7 +190,27 @@ def _associate_alone(m: int, w: World) -> None:
         if track.swept:
             plot.weight = max(plot.weight - pair.beta, 0.0)
     if track.swept:
-        track.score += math.log(total)
+        _credit(track, proof)
+
+
+@bare
+def _credit(track: Any, proof: float) -> None:
+    """Add a pass's evidence to the track's score, and to its ledger, which is not held down."""
+    track.score += math.log(proof)
+    track.peak += math.log(proof)
+
+
+@bare
+def _proof(weight: float, track: Any, plot: Any, par: Any) -> float:
+    """What a pair's weight counts for the track's life.
+
+    Where it was born in dense clutter that can be denser than it looks, as for a young track: thrown
+    off its target at the edge of a patch it would live on.
+    """
+    if not track.dense:
+        return weight
+    proof: float = weight * _density_at(plot, track.near, track.exposure, par)
+    return proof / (_doubted(track, plot, par) * _DENSITY_ERROR)
 
 
 @bare
@@ -247,7 +269,7 @@ def _associate(lo: int, hi: int, w: World) -> None:
     for k in range(n):
         i = row[k]
         member = w.members[lo + i]
-        total[i] += weight[k]
+        total[i] += _proof(weight[k], tracks[member.track], pool[w.pairs[kept[k]].plot], par)
         pair = w.pairs[member.pairs + member.kept]
         _keep_pair(kept[k], member, w)
         pair.beta = beta[k]
@@ -259,7 +281,7 @@ def _associate(lo: int, hi: int, w: World) -> None:
     for i in range(m):
         track = tracks[w.members[lo + i].track]
         if track.swept:
-            track.score += math.log(total[i])
+            _credit(track, total[i])
             w.members[lo + i].rough = rough[i]
             if rough[i]:
                 w.books.tally[C_APPROXIMATE] += 1

@@ -240,7 +240,7 @@ def confirm(index: int, plot: Any, beam: Any, w: World) -> None:
     if not track.voiced:
         # The number of its first plot is another branch's; no track starts from this plot.
         track.id, track.voiced = plot.ordinal, True
-    track.proven = False
+    track.proven, track.peak = False, track.score
     track.level, track.slot = CONFIRMED, size[N_SLOTS]
     w.belief.owner[track.slot] = index
     size[N_SLOTS] += 1

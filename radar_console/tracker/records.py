@@ -57,7 +57,7 @@ STATE = np.dtype(
         ("anchor", "f8", (4,)),  # what the particles are offsets from, at t
         ("cos", "f8"),  # the particles' first axis is the bearing at confirmation
         ("sin", "f8"),
-        ("peak", "f8"),  # the highest score so far
+        ("peak", "f8"),  # the highest score so far; of a confirmed track the score as if it had no limit
         ("history", "i8"),  # hits of the last passes, as bits
         ("passes", "i8"),
         ("slot", "i8"),  # of its particles; -1 none

@@ -33,6 +33,7 @@ from radar_console.tracker.records import (
     BRANCHING,
     C_CAPPED,
     C_EXTENDED,
+    C_LOST,
     C_MERGED,
     C_STARTED,
     CONFIRMED,
@@ -349,9 +350,12 @@ def _merge(plot: Any, beam: Any, w: World) -> bool:
                 winner = index
         k = edges[k].next
     if winner >= 0:
+        known = _kin(tracks[winner], w)
         _absorb(winner, ends[:n], NO, w)
         if tracks[winner].level == CONFIRMED:
             return False
+        if known >= 0:
+            _succeed(winner, known, w)
         _confirm(winner, plot, beam, w)
         plot.weight = max(plot.weight - tracks[winner].probability, 0.0)
         return True
@@ -377,7 +381,8 @@ def _merge(plot: Any, beam: Any, w: World) -> bool:
 def _is_known(track: Any, w: World) -> bool:
     """A confirmed track may be the young one's target: it waits until they are apart, or it has faded.
 
-    Branches of one first plot share what had been found before they parted.
+    Branches of one first plot share what had been found before they parted. Of these the young one
+    waits only until the evidence since then is clearly for it.
     """
     spread = math.sqrt(track.P[0, 0] + track.P[1, 1])
     for slot in range(w.books.size[N_SLOTS]):
@@ -388,13 +393,37 @@ def _is_known(track: Any, w: World) -> bool:
         if other.dead:
             continue
         if other.born == track.born:
-            return True
+            if track.score < other.peak + _DROP:
+                return True
+            continue
         e, n, ee, en, nn = _predicted(other, max(track.t - other.t, 0.0))
         de, dn = e - track.x[0], n - track.x[1]
         ee, en, nn = ee + track.P[0, 0], en + track.P[0, 1], nn + track.P[1, 1]
         if nn * de * de - 2.0 * en * de * dn + ee * dn * dn < _APART * (ee * nn - en * en):
             return True
     return False
+
+
+@bare
+def _kin(track: Any, w: World) -> int:
+    """The confirmed track from the same first plot as a young branch; -1 none."""
+    if track.level != CONFIRMED and _branches(track, w.par):
+        for slot in range(w.books.size[N_SLOTS]):
+            if w.books.whereabouts[slot, B_BORN] == track.born and not w.tracks[w.belief.owner[slot]].dead:
+                return int(w.belief.owner[slot])
+    return -1
+
+
+@bare
+def _succeed(index: int, known: int, w: World) -> None:
+    """Have a proven track take over the number of the confirmed one, which was thrown off their target."""
+    track, other = w.tracks[index], w.tracks[known]
+    if track.voiced:
+        _report(track, _DELETED, NO, NO, w.pool[0], math.nan, NO, track.t, w.par, w.books)
+        w.books.tally[C_MERGED] += 1
+    track.id, track.born, track.voiced, other.voiced = other.id, other.born, True, False
+    _kill(other, known, w.books)
+    w.books.tally[C_LOST] += 1
 
 
 @bare

@@ -58,7 +58,7 @@ def errors(name, doppler=False, seed=1, **changes):
     rng = np.random.default_rng(seed)
     nees, nis = np.empty((RUNS, STEPS)), np.empty((RUNS, STEPS))
     for run in range(RUNS):
-        solo = Solo(**({"outliers": 0.0} | FILTERS[name] | changes))
+        solo = Solo(**({"outliers": 0.0, "gate_probability": 0.9999} | FILTERS[name] | changes))
         truth = matched(rng, solo.par, solo.x.shape[1])
         solo.start(truth[0, :4] + np.sqrt(np.diag(P0)) * rng.normal(size=4), P0)
         for k in range(STEPS):
@@ -123,7 +123,9 @@ def flights(name, kind, runs=30, seed=3, **changes):
     squares, within, outside = [], [], []
     for _ in range(runs):
         truth, begin = manoeuvring(rng, kind)
-        solo = Solo(**({"outliers": 0.0} | FILTERS[name] | changes)).start(truth[0], P0)
+        solo = Solo(**({"outliers": 0.0, "gate_probability": 0.9999} | FILTERS[name] | changes)).start(
+            truth[0], P0
+        )
         for k in range(1, len(truth)):
             plot = seen(rng, T * k, truth[k])
             d2 = distance(solo.advance(T * k), plot[0])
