@@ -22,7 +22,7 @@ from scenes import (
 
 from radar_console.core.messages import Radar, TrackStatus
 from radar_console.core.units import TURN
-from radar_console.tracker import Tracker, clusters, youth
+from radar_console.tracker import Tracker, agenda, clusters, youth
 from radar_console.tracker.records import N_EDGES, N_TRACKS, PENDING, STATE, TENTATIVE
 
 MODES = ["auto", "m-of-n", "score", "branching"]
@@ -311,7 +311,8 @@ def test_a_branch_with_more_evidence_takes_over(lead, succeeds):
     assert world.books.size[N_TRACKS] == 1
     track, branch = world.tracks[0], world.tracks[1]
     world.tracks[1] = track
-    world.books.size[N_TRACKS], world.books.wake[:2] = 2, -np.inf
+    world.books.size[N_TRACKS] = 2
+    agenda.enter(1, world.books)
     branch["level"], branch["slot"], branch["voiced"], branch["dense"] = TENTATIVE, -1, False, True
     branch["score"] = branch["peak"] = track["peak"] + lead
     for name in ("x", "anchor"):
