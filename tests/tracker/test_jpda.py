@@ -186,6 +186,20 @@ def test_the_budget_is_that_of_the_call():
     assert np.all(part.approximate.reshape(many, size).any(axis=1) == part.approximate[::size])
 
 
+@pytest.mark.parametrize("more", [0, 1])
+def test_of_very_many_pairs_none_is_summed_exactly(more):
+    many = jpda.MOST_PAIRS // 4 + more
+    row, col = (
+        np.repeat(np.arange(2 * many), 2),
+        np.repeat(np.arange(many), 4) * 2 + np.tile([0, 1], 2 * many),
+    )
+    found = jpda.sparse(np.full(2 * many, 0.1), 2 * many, row, col, np.ones(4 * many))
+    assert np.all(found.approximate == (more > 0))
+    # The plots are alike: each track has both, or none, with the same probability.
+    assert np.ptp(found.p_miss) <= 1e-12
+    assert np.abs(found.p_miss + found.p[::2] + found.p[1::2] - 1.0).max() <= 1e-12
+
+
 @pytest.mark.parametrize("shape", [(300, 500), (500, 300), (40, 40)])
 def test_what_is_too_wide_is_approximated(shape):
     """A crowd: every row is a probability, no plot is used twice, and plots alike are treated alike."""

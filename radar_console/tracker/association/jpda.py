@@ -25,7 +25,13 @@ BUDGET = 8.0e6
 """Steps of one call, about 1 ns each, beyond which clusters are approximated.
 
 Counted are the exact sums, the search for their order, and something for each pair, so that the time of a
-call has a bound: half a million pairs whose plots are shared take it all.
+call has a bound.
+"""
+
+MOST_PAIRS = 125_000
+"""Pairs of shared plots in one call, many times a radar's, beyond which none of its clusters is summed exactly.
+
+Spread over so much memory, a step takes several nanoseconds.
 """
 
 _SWEEPS = 200
@@ -231,7 +237,7 @@ def _solve(
     folded = left >= 0.0
     if not folded:
         sweeps = _sweeps(col.size, _with_pairs(start))
-    elif _too_wide(every, claims):
+    elif count > MOST_PAIRS or _too_wide(every, claims):
         left = 0.0
     if left > 0.0 or sweeps > _FEW:
         members, begin, number = _components(every, claims)
