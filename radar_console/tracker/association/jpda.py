@@ -29,7 +29,7 @@ call has a bound.
 """
 
 MOST_PAIRS = 125_000
-"""Pairs of shared plots in one call, many times a radar's, beyond which none of its clusters is summed exactly.
+"""Pairs of shared plots, many times a radar's, beyond which none of a call's clusters is summed exactly.
 
 Spread over so much memory, a step takes several nanoseconds.
 """
