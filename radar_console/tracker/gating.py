@@ -130,7 +130,7 @@ def look(track: Any, beam: Any, par: Any) -> tuple[float, float]:
     track.range, track.half_width, track.along = r, h, along
     if track.claims:
         return -math.inf, -math.inf
-    return rest(track, beam, par)
+    return resting(track, beam, par)
 
 
 @bare
@@ -140,7 +140,7 @@ def turned(track: Any, de: float, dn: float) -> float:
 
 
 @bare
-def rest(track: Any, beam: Any, par: Any) -> tuple[float, float]:
+def resting(track: Any, beam: Any, par: Any) -> tuple[float, float]:
     """Until which beam angle and time a track can rest whose phase and extent are set, see `look`."""
     r, h = track.range, track.half_width
     ahead = -h - MARGIN - track.rho

@@ -47,8 +47,8 @@ from radar_console.tracker.records import (
 )
 
 _too_fast, _predicted, _place, _turned = gating.too_fast, gating.predicted, gating.place, gating.turned
-_rest, _start_belief = gating.rest, filters.start
-_enter, _sleep, _leave, _move_entry = agenda.enter, agenda.rest, agenda.leave, agenda.move
+_resting, _start_belief = gating.resting, filters.start
+_enter, _rest, _leave, _move_entry = agenda.enter, agenda.rest, agenda.leave, agenda.move
 _gather = clutter.gather
 _height, _begin_height, _learn = height.predicted, height.begin, identity.learn
 _TURN = 2.0 * math.pi
@@ -130,9 +130,9 @@ def serve(
     track.served, track.claims = True, False
     if not seen:  # the gate is what it was, a turn on
         track.rho -= _TURN
-        angle, time = _rest(track, beam, par)
+        angle, time = _resting(track, beam, par)
         if angle > beam.phi:
-            _sleep(index, angle, time, par.bin, books)
+            _rest(index, angle, time, par.bin, books)
     if not seen and books.blank[math.floor(crossed / par.bin) % books.blank.size]:
         books.tally[C_BLANKED] += 1
         return
