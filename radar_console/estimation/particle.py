@@ -37,7 +37,6 @@ BROAD = 64.0  # variance of an outlier, in units of the claimed one
 _NORMALS_BITS = 16
 _LEAST = 1e-30  # of a sum of weights
 _TURN = 2.0 * math.pi
-_ONE = np.float32(1.0)
 _HALF = np.float32(0.5)
 # Sums in any order, so that they vectorise; the same order every time.
 _SUMS = {"reassoc", "contract", "nsz"}
@@ -187,12 +186,12 @@ def condition_on_nothing(S: Array, rest: float, apart: float, terms: Singles) ->
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _distances(particles: Singles, lo: int, hi: int, z: Singles, terms: Singles, out: Singles) -> None:
-    """Fill `out` (hi - lo,) with the squared whitened innovations of particles `lo` to `hi`."""
+def _distances(particles: Singles, z: Singles, terms: Singles, out: Singles) -> None:
+    """Fill `out` (N,) with the squared whitened innovations of the particles."""
     z_a, z_b, rate, lag, u, v = z[Z_A], z[Z_B], z[Z_RATE], z[Z_LAG], z[Z_U], z[Z_V]
     w_aa, w_ba, w_bb = terms[W_AA], terms[W_BA], terms[W_BB]
     w_ra, w_rb, w_rr = terms[W_RA], terms[W_RB], terms[W_RR]
-    p_a, p_b, v_a, v_b = particles[0, lo:hi], particles[1, lo:hi], particles[2, lo:hi], particles[3, lo:hi]
+    p_a, p_b, v_a, v_b = particles[0], particles[1], particles[2], particles[3]
     for i in range(out.size):
         a = z_a - p_a[i] - lag * v_a[i]
         b = z_b - p_b[i] - lag * v_b[i]
@@ -211,27 +210,12 @@ def _least(values: Singles) -> float:
 
 
 @njit(cache=True, nogil=True, error_model="numpy", fastmath=_SUMS)
-def _mixture(
-    weights: Singles, near: Singles, far: Singles, log_near: float, log_far: float, relative: Singles
-) -> float:
-    """Fill `relative` (N,) with exp(log_near - near/2) + exp(log_far - far/2); Σ w `relative`."""
-    first, second = np.float32(log_near), np.float32(log_far)
-    total = 0.0
-    for i in range(relative.size):
-        g = _exponential(first - _HALF * near[i]) + _exponential(second - _HALF * far[i])
-        relative[i] = g
-        total += weights[i] * g
-    return total
-
-
-@njit(cache=True, nogil=True, error_model="numpy", fastmath=_SUMS)
-def _gaussian(weights: Singles, near: Singles, log_near: float, relative: Singles) -> float:
-    """Fill `relative` (N,) with exp(log_near - near/2); Σ w `relative`."""
-    first = np.float32(log_near)
-    total = 0.0
-    for i in range(relative.size):
-        g = _exponential(first - _HALF * near[i])
-        relative[i] = g
+def _densities(weights: Singles, log_norm: float, values: Singles) -> float:
+    """Turn squared distances d² (N,) into exp(`log_norm` - d²/2); Σ w of these."""
+    most, total = np.float32(log_norm), 0.0
+    for i in range(values.size):
+        g = _exponential(most - _HALF * values[i])
+        values[i] = g
         total += weights[i] * g
     return total
 
@@ -254,24 +238,21 @@ def weigh(
 
     Returns
     -------
-    log ĝ = log Σ w_i g(x_i), and Σ w_i `relative`_i, where `relative` (N,) is filled with the
-    particles' likelihoods up to a common factor: nothing underflows, however far z is out.
+    log ĝ = log Σ w_i g(x_i), and Σ w_i `relative`_i, where `relative` (2, N) is filled with the two
+    parts of the particles' likelihoods up to a common factor: nothing underflows, however far z is out.
     """
-    terms = np.empty(TERMS, np.float32)
-    near = np.empty(relative.size, np.float32)
-    log_near = condition(S, z, R, r, 1.0, 0.0, 0.0, terms)
-    _distances(particles, 0, near.size, z, terms, near)
-    nearest = _least(near)
+    terms, near, far = np.empty(TERMS, np.float32), relative[0], relative[1]
+    log_near = math.log(1.0 - outliers) + condition(S, z, R, r, 1.0, 0.0, 0.0, terms)
+    _distances(particles, z, terms, near)
+    shift = log_near - 0.5 * _least(near)
     if outliers > 0.0:
-        far = np.empty(relative.size, np.float32)
-        log_near += math.log(1.0 - outliers)
         log_far = math.log(outliers) + condition(S, z, R, r, BROAD, 0.0, 0.0, terms)
-        _distances(particles, 0, far.size, z, terms, far)
-        shift = max(log_near - 0.5 * nearest, log_far - 0.5 * _least(far))
-        total = _mixture(weights, near, far, log_near - shift, log_far - shift, relative)
+        _distances(particles, z, terms, far)
+        shift = max(shift, log_far - 0.5 * _least(far))
+        total = _densities(weights, log_near - shift, near) + _densities(weights, log_far - shift, far)
     else:
-        shift = log_near - 0.5 * nearest
-        total = _gaussian(weights, near, log_near - shift, relative)
+        far[:] = 0.0
+        total = _densities(weights, log_near - shift, near)
     total = max(total, _LEAST)
     return math.log(total) + shift, total
 
@@ -323,39 +304,12 @@ def shake(particles: Singles, lo: int, hi: int, z: Singles, terms: Singles, nois
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def are_outliers(
-    parents: Singles,
-    lo: int,
-    hi: int,
-    z: Singles,
-    near: Singles,
-    far: Singles,
-    log_odds: float,
-    uniform: Singles,
-    found: Any,
-) -> None:
-    """Draw for particles `lo` to `hi` whether their measurement was an outlier.
-
-    `near` and `far` are the terms of the two densities, `log_odds` the log ratio of their factors;
-    `found` (N,) is filled.
-    """
-    count = hi - lo
-    d_near, d_far = np.empty(count, np.float32), np.empty(count, np.float32)
-    _distances(parents, lo, hi, z, near, d_near)
-    _distances(parents, lo, hi, z, far, d_far)
-    shift, lot, odd = np.float32(log_odds), uniform[lo:hi], found[lo:hi]
-    for k in range(count):
-        odds = _exponential(shift + _HALF * (d_far[k] - d_near[k]))
-        odd[k] = lot[k] * (_ONE + odds) < _ONE
-
-
-@njit(cache=True, nogil=True, error_model="numpy")
 def gather(source: Singles, ancestors: Indices, out: Singles) -> None:
     """Copy each ancestor's column of `source` (rows, N) to `out` (rows, N)."""
     for row in range(source.shape[0]):
         values, copies = source[row], out[row]
         for k in range(ancestors.size):
-            copies[k] = values[ancestors[k]]
+            copies[k] = values[np.uint32(ancestors[k])]  # or numba looks whether it counts from the end
 
 
 @njit(cache=True, nogil=True, error_model="numpy", fastmath=_SUMS)

@@ -23,41 +23,49 @@ Indices = NDArray[np.int32]
 SYSTEMATIC, STRATIFIED, RESIDUAL, MULTINOMIAL = range(4)
 
 _mix, _uniforms = draws.mix, draws.uniforms
-_FIXED = 32  # binary places of a number of copies
-_UNIT = float(1 << _FIXED)
-_TO_FIXED = np.uint64(64 - _FIXED)
+_FIXED = np.uint64(32)  # binary places of a number of copies
+_UNIT = 2.0 ** int(_FIXED)
+_TO_FIXED = np.uint64(64) - _FIXED
+_BLOCK = 16  # pairs that are looked at together
 _TO_UNIT = 2.0**-53
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def systematic_pairs(
-    terms: Singles, total: float, key: Any, filled: Indices, ancestors: Indices, bounds: Any
-) -> None:
+def systematic_pairs(terms: Singles, total: float, key: Any, ancestors: Indices, bounds: Any) -> None:
     """Systematic resampling of N particles from the pairs of an alternative and a particle.
 
     The copies of one alternative stand together. The sums are in fixed point: exact, and no chain
-    of slow additions.
+    of slow additions. Where the comb has no tooth in a whole block, nobody is looked at alone.
 
     Parameters
     ----------
     terms : (alternatives, N) weight of each pair, ≥ 0; their sum is `total`
-    filled : (N + 1,) scratch
     ancestors : (N,) filled with the particle of each copy
     bounds : (alternatives + 1,) filled with where each alternative's copies begin
     """
     rows, count = terms.shape
-    filled[:] = 0
-    cumulative = np.int64(_mix(key) >> _TO_FIXED)  # the comb's first tooth
+    blocks = (count + _BLOCK - 1) // _BLOCK
+    # Unsigned numbers as indices: numba looks at others whether they count from the end.
+    filled, share = np.zeros(count + 1, np.int32), np.zeros(blocks * _BLOCK, np.uint64)
+    cumulative = _mix(key) >> _TO_FIXED  # the comb's first tooth
     scale = (count * _UNIT + rows * count) / total  # truncation takes less than a unit from each pair
-    place = np.int64(0)
+    place, last_place = np.uint64(0), np.uint64(count)
     for row in range(rows):
         bounds[row] = place
         term = terms[row]
         for i in range(count):
-            # Overwritten by the next one, unless this pair has copies.
-            filled[place] = i
-            cumulative += np.int64(term[i] * scale)
-            place = min(cumulative >> _FIXED, count)
+            share[i] = np.int64(term[i] * scale)
+        for block in range(blocks):
+            begin, after = np.uint64(block * _BLOCK), cumulative
+            for k in range(_BLOCK):
+                after += share[begin + np.uint64(k)]
+            if after >> _FIXED != place:
+                for k in range(_BLOCK):
+                    pair = begin + np.uint64(k)
+                    filled[place] = pair  # overwritten by the next one, unless this one has copies
+                    cumulative += share[pair]
+                    place = min(cumulative >> _FIXED, last_place)
+            cumulative = after
         filled[place] = 0
     bounds[rows] = count
     for row in range(rows):

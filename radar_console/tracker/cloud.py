@@ -20,8 +20,8 @@ _key, _mix, _uniforms, _pairs_of_normals = draws.key, draws.mix, draws.uniforms,
 _systematic_pairs, _resample = resampling.systematic_pairs, resampling.resample
 _draw, _grow, _diffuse, _cholesky = particle.draw, particle.grow, particle.diffuse, particle.cholesky
 _weigh, _condition, _given_position = particle.weigh, particle.condition, particle.given_position
-_condition_on_nothing, _are_outliers = particle.condition_on_nothing, particle.are_outliers
-_propose, _shake, _gather, _centre = particle.propose, particle.shake, particle.gather, particle.centre
+_condition_on_nothing, _propose = particle.condition_on_nothing, particle.propose
+_shake, _gather, _centre = particle.shake, particle.gather, particle.centre
 _normalise, _regularise = particle.normalise, particle.regularise
 _begin_manoeuvres, _move, _forecast = manoeuvres.start, manoeuvres.advance, manoeuvres.forecast
 _plain = manoeuvres.plain
@@ -139,7 +139,7 @@ def _extrapolate(track: Any, T: float) -> None:
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def log_likelihood(track: Any, plot: Any, par: Any, belief: Belief, relative: Singles) -> tuple[float, float]:
-    """log ĝ of the plot, m⁻² (with a range rate per m/s), and Σ w `relative`; see `particle.weigh`."""
+    """log ĝ of the plot, m⁻² (with a range rate per m/s), and Σ w `relative` (2, N); see `particle.weigh`."""
     z, R = np.empty(_MEASURED, np.float32), np.empty(3)
     r = _measure(track, plot, par, z, R)
     slot = track.slot
@@ -186,18 +186,19 @@ def update(
 
     The particles' weights become w (β_0 + Σ_j β_j g_j / ĝ_j). The bootstrap filter resamples them when
     N_eff is low. With the other proposals each new particle comes from a pair of an old one and a plot,
-    or none, and its position is drawn from the pair's posterior; the adapted filter resamples the pairs.
+    such as it claims to be or an outlier, or none, and its position is drawn from the pair's posterior;
+    the adapted filter resamples the pairs.
 
     Parameters
     ----------
     miss : β_0
     beta, total : (plots,) β_j, and Σ w `relative`_j
-    relative : (plots, N) likelihoods of the particles, up to a factor
+    relative : (plots, 2, N) likelihoods of the particles, up to a factor: as claimed, and as an outlier
     chosen : (plots,) rows of the plots in `pool`
     """
     weights = belief.weights[track.slot]
     key = _key(par.seed, track.id, track.passes + _UPDATE)
-    terms = np.empty((beta.size + 1, weights.size), np.float32)
+    terms = np.empty((1 + 2 * beta.size, weights.size), np.float32)
     everything = _pair_weights(weights, miss, beta, total, relative, terms)
     if not everything > 0.0:
         return
@@ -220,17 +221,22 @@ def update(
 def _pair_weights(
     weights: Singles, miss: float, beta: Array, total: Array, relative: Singles, terms: Singles
 ) -> float:
-    """Fill `terms` (plots + 1, N) with β_0 w and β_j w g_j / ĝ_j; their sum."""
+    """Fill `terms` (1 + 2 plots, N) with β_0 w, and for each plot twice β_j w g_j / ĝ_j; their sum.
+
+    The two are of g_j's parts, the plot such as it claims to be, and an outlier.
+    """
     nothing, everything = np.float32(miss), 0.0
     first = terms[0]
     for i in range(weights.size):
         first[i] = nothing * weights[i]
         everything += first[i]
     for j in range(beta.size):
-        scale, row, g = np.float32(beta[j] / total[j]), terms[j + 1], relative[j]
-        for i in range(weights.size):
-            row[i] = scale * weights[i] * g[i]
-            everything += row[i]
+        scale = np.float32(beta[j] / total[j])
+        for part in range(2):
+            row, g = terms[1 + 2 * j + part], relative[j, part]
+            for i in range(weights.size):
+                row[i] = scale * weights[i] * g[i]
+                everything += row[i]
     return everything
 
 
@@ -302,9 +308,9 @@ def _propose_cloud(
     """Draw new particles from the pairs of an alternative and an old particle."""
     particles, weights = belief.particles[track.slot], belief.weights[track.slot]
     model, S, count, m = belief.model[track.slot], belief.P[track.slot, 0], weights.size, chosen.size
-    ancestors, bounds = np.empty(count, np.int32), np.empty(m + 2, np.int64)
+    ancestors, bounds = np.empty(count, np.int32), np.empty(len(terms) + 1, np.int64)
     if par.proposal == ADAPTED:
-        _systematic_pairs(terms, everything, key, np.empty(count + 1, np.int32), ancestors, bounds)
+        _systematic_pairs(terms, everything, key, ancestors, bounds)
         weights[:] = np.float32(1.0 / count)
     else:
         _choose_pairs(terms, weights, key, par, ancestors, bounds)
@@ -326,38 +332,30 @@ def _propose_cloud(
     shaken = par.proposal != ADAPTED or least_r < math.inf
     if shaken:
         _pairs_of_normals(_mix(key + np.uint64(1)), noise[2], noise[3])
-    near = np.empty(_TERMS, np.float32)
-    nothing = np.zeros(_MEASURED, np.float32)
+    how, nothing = np.empty(_TERMS, np.float32), np.zeros(_MEASURED, np.float32)
     nothing[_Z_U] = 1.0
-    _condition_on_nothing(S, rest, apart, near)
-    _propose(parents, bounds[0], bounds[1], nothing, near, noise, particles)
-    if shaken:
-        _shake(particles, bounds[0], bounds[1], nothing, near, noise)
-    uniform, odd = np.empty(count if par.outliers > 0.0 else 0, np.float32), np.zeros(count, np.bool_)
-    _uniforms(_mix(key + np.uint64(2)), uniform)
+    _condition_on_nothing(S, rest, apart, how)
+    _propose_some(parents, bounds[0], bounds[1], nothing, how, noise, shaken, particles)
     for j in range(m):
-        lo, hi = bounds[j + 1], bounds[j + 2]
-        if lo < hi:
-            _propose_plot(
-                parents,
-                lo,
-                hi,
-                S,
-                Z[j],
-                R[j],
-                r[j],
-                rest,
-                apart,
-                par.outliers,
-                uniform,
-                odd,
-                noise,
-                shaken,
-                particles,
-            )
+        for part in range(2):
+            lo, hi, scale = bounds[1 + 2 * j + part], bounds[2 + 2 * j + part], _BROAD if part else 1.0
+            if lo < hi:
+                _condition(S, Z[j], R[j], r[j], scale, rest, apart, how)
+                _propose_some(parents, lo, hi, Z[j], how, noise, shaken, particles)
     S[0, 0] = apart
     S[0, 1] = S[1, 0] = slope * apart
     S[1, 1] = rest + slope * slope * apart
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _propose_some(
+    parents: Singles, lo: int, hi: int, z: Singles, how: Singles, noise: Singles, shaken: bool,
+    particles: Singles,
+) -> None:  # fmt: skip
+    """Draw particles `lo` to `hi`, whose alternative is the same."""
+    _propose(parents, lo, hi, z, how, noise, particles)
+    if shaken:
+        _shake(particles, lo, hi, z, how, noise)
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -371,28 +369,6 @@ def _open_position(S: Array, Z: Singles, R: Array) -> float:
         seen = k + lag * (S[0, 1] + lag * S[1, 1]) + OPEN_SHARE * least
         left = min(left, max(S[0, 0] - k * k / seen, 0.0) if seen > 0.0 else 0.0)
     return left
-
-
-@njit(cache=True, nogil=True, error_model="numpy")
-def _propose_plot(
-    parents: Singles, lo: int, hi: int, S: Array, z: Singles, R: Array, r: float, rest: float, apart: float,
-    outliers: float, uniform: Singles, odd: Any, noise: Singles, shaken: bool, particles: Singles,
-) -> None:  # fmt: skip
-    """Draw particles `lo` to `hi` given one plot; to some of them it is an outlier."""
-    near, far = np.empty(_TERMS, np.float32), np.empty(_TERMS, np.float32)
-    log_near = _condition(S, z, R, r, 1.0, rest, apart, near)
-    _propose(parents, lo, hi, z, near, noise, particles)
-    if shaken:
-        _shake(particles, lo, hi, z, near, noise)
-    if outliers > 0.0:
-        log_far = _condition(S, z, R, r, _BROAD, rest, apart, far)
-        log_odds = math.log((1.0 - outliers) / outliers) + log_near - log_far
-        _are_outliers(parents, lo, hi, z, near, far, log_odds, uniform, odd)
-        for k in range(lo, hi):
-            if odd[k]:
-                _propose(parents, k, k + 1, z, far, noise, particles)
-                if shaken:
-                    _shake(particles, k, k + 1, z, far, noise)
 
 
 @njit(cache=True, nogil=True, error_model="numpy")

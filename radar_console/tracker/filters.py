@@ -46,7 +46,7 @@ def advance(track: Any, t: float, par: Any, belief: Belief) -> None:
 
 @owning
 def log_likelihood(track: Any, plot: Any, par: Any, belief: Belief, relative: Singles) -> tuple[float, float]:
-    """log ĝ of a plot, and Σ w `relative`; `relative` (N,) is for `update`."""
+    """log ĝ of a plot, and Σ w `relative`; `relative` (2, N) is for `update`."""
     if par.filter == PARTICLE:
         return _weigh_cloud(track, plot, par, belief, relative)
     return _weigh_bank(track, plot, par, belief, relative)
@@ -66,7 +66,7 @@ def update(
 ) -> None:
     """Condition on the plots `chosen` (plots,) of `pool` with probabilities `beta`, `miss` for none.
 
-    `total` (plots,) and `relative` (plots, N) are what `log_likelihood` gave.
+    `total` (plots,) and `relative` (plots, 2, N) are what `log_likelihood` gave.
     """
     if par.filter == PARTICLE:
         _update_cloud(track, miss, beta, total, relative, chosen, pool, par, belief)

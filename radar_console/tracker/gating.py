@@ -113,12 +113,10 @@ def look(track: Any, beam: Any, par: Any) -> tuple[float, float]:
     """
     T = max(beam.t - track.t, 0.0)
     if track.level == STARTER:
-        e, n = place(track, T)
-        de, dn = e - beam.e, n - beam.n
-        r = math.sqrt(de * de + dn * dn)
+        if not (track.s_e == beam.e and track.s_n == beam.n):
+            sight(track, beam, par)
         # Where a target can have got to; the ellipse of its unknown velocity reaches farther.
-        noise = track.sd_range * track.sd_range + (r * track.sd_azimuth) ** 2
-        reach = start_reach(track, T, noise, par)
+        r, reach, angle = track.range, track.spread + par.max_speed * T, track.turned
         h, along = (arcsine(reach / r), reach) if reach < r else (math.pi, math.inf)
     else:
         e, n, ee, en, nn = predicted(track, T)
@@ -126,11 +124,22 @@ def look(track: Any, beam: Any, par: Any) -> tuple[float, float]:
         r = math.sqrt(de * de + dn * dn)
         gamma = limit(track, par) * (2.0 if par.rectangle else 1.0)  # of the ellipse around the rectangle
         h, along = extent(de, dn, ee, en, nn, track.sd_range, track.sd_azimuth, gamma)
-    track.rho = beam.phi - track.psi - _TURN - turned(track, de, dn)
+        angle = turned(track, de, dn)
+    track.rho = beam.phi - track.psi - _TURN - angle
     track.range, track.half_width, track.along = r, h, along
     if track.claims:
         return -math.inf, -math.inf
     return resting(track, beam, par)
+
+
+@bare
+def sight(track: Any, beam: Any, par: Any) -> None:
+    """Set what a starter, which stands still, keeps as long as the sensor does."""
+    de, dn = track.x[0] - beam.e, track.x[1] - beam.n
+    r = math.sqrt(de * de + dn * dn)
+    noise = track.sd_range * track.sd_range + (r * track.sd_azimuth) ** 2
+    track.range, track.spread, track.turned = r, start_reach(track, 0.0, noise, par), turned(track, de, dn)
+    track.s_e, track.s_n = beam.e, beam.n
 
 
 @bare
@@ -161,8 +170,11 @@ def resting(track: Any, beam: Any, par: Any) -> tuple[float, float]:
 
 
 @bare
-def drift(track: Any, lag: float) -> float:
-    """How far the track's gate can move in `lag` s, m."""
+def drift(track: Any, lag: float, par: Any) -> float:
+    """How far the track's gate can move, or a starter's grow, in `lag` s, m."""
+    if track.level == STARTER:
+        growth: float = lag * par.max_speed
+        return growth
     x, P = track.x, track.P
     speed: float = math.sqrt(x[2] * x[2] + x[3] * x[3]) + _SURE_SIGMAS * math.sqrt(P[2, 2] + P[3, 3])
     return lag * speed

@@ -16,6 +16,7 @@ _TURN = 2.0 * math.pi
 _EXTENDED = int(CentroidFlag.EXTENDED)
 _GRID = 2.0**20  # per s and per m: interpolated values are rounded, so that no cut shows in them
 _SD_HEIGHT = 30.0  # m, of a reported height
+HUGE = 1e12  # s, rad and m: no time, angle or position of a sensor
 _FARTHEST = 1e8  # m: no radar's range
 _OVERHEAD = 1e3  # m, beyond its range, that a target may be above the radar, by the errors of both
 _WIDEST = 1.0  # rad: an azimuth that is less certain says nothing
@@ -94,10 +95,7 @@ def take(
     for k in range(table.size):
         row = table[k]
         t, r, azimuth = row.time, row.range, row.azimuth
-        if (
-            not (math.isfinite(t) and math.isfinite(r) and math.isfinite(azimuth))
-            or not 0.0 <= r <= _FARTHEST
-        ):
+        if not (abs(t) <= HUGE and math.isfinite(azimuth) and 0.0 <= r <= _FARTHEST):  # nor if one is NaN
             continue
         lower, part = bracket(t, time)
         angle = between(angles, lower, part)

@@ -58,6 +58,7 @@ DROP = 4.6  # of the score from its peak, after which a young track is given up:
 _DENSER = math.log(10.0)  # what dense clutter adds to the score that confirms
 _DOUBT = 0.1  # and more for each pass: what an error of the density by a tenth adds to a false score
 _LEAST_HITS = 3
+_LEAST_LOG_MISS = math.log(1e-3)
 _WIDER = 3.0  # velocities at confirmation: so young an estimate errs more than its covariance says
 _TENTATIVE = variable(TrackStatus.TENTATIVE)
 _CONFIRMED = variable(TrackStatus.CONFIRMED)
@@ -92,7 +93,7 @@ def begin(plot: Any, dense: bool, w: World) -> None:
     track.peak = track.score
     track.history, track.passes, track.hits, track.misses = 1, 1, 1, 0
     track.last, track.previous = plot.ordinal, -1
-    track.slot, track.place, track.first = -1, -1, -1
+    track.slot, track.place, track.first, track.s_e = -1, -1, -1, np.nan
     track.mode_3a, track.agreed, track.address = plot.mode_3a, 1, plot.address
     track.near = track.exposure = 0.0
     _begin_height(track, plot)
@@ -126,7 +127,7 @@ def serve(
     r, crossed = math.sqrt(de * de + dn * dn), beam.phi - track.rho
     track.psi += _TURN + _turned(track, de, dn)
     if r > 0.0:
-        track.u_e, track.u_n = de / r, dn / r
+        track.u_e, track.u_n, track.turned = de / r, dn / r, 0.0
     track.served, track.claims = True, False
     if not seen:  # the gate is what it was, a turn on
         track.rho -= _TURN
@@ -198,8 +199,7 @@ def may_be_near(slot: int, track: Any, spread: float, sigmas: float, books: Book
 @bare
 def _highest_score(par: Any) -> float:
     """The score that `delete_misses` misses in a row, and no fewer, take away."""
-    miss = math.log(max(1.0 - par.p_d * par.p_g, 1e-3))
-    highest: float = _FIRST_SCORE - (par.delete_misses + 0.5) * miss
+    highest: float = _FIRST_SCORE - (par.delete_misses + 0.5) * max(par.log_miss, _LEAST_LOG_MISS)
     return highest
 
 
@@ -223,7 +223,7 @@ def _keep(track: Any, index: int, hit: bool, par: Any, books: Books) -> int:
 def _judge(track: Any, index: int, hit: bool, par: Any, books: Books) -> int:
     """Find a young track proven, or delete it; its status after this pass."""
     track.peak = max(track.peak, track.score)
-    fast = _too_fast(track, par)
+    fast = track.level == TENTATIVE and _too_fast(track, par)
     ripe = track.level == TENTATIVE and hit and track.hits >= _LEAST_HITS
     track.proven = ripe and not fast and _proven(track, par)
     if not track.proven and (fast or _hopeless(track, par)):

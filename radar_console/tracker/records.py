@@ -33,6 +33,10 @@ STATE = np.dtype(
         ("half_width", "f8"),  # of the gate, seen from the radar
         ("range", "f8"),  # m, of its middle from the sensor
         ("along", "f8"),  # m, half the extent of the gate in range
+        ("s_e", "f8"),  # position of the sensor from which a starter was sighted
+        ("s_n", "f8"),
+        ("turned", "f8"),  # of a starter, seen from there: angle from the bearing of the last pass,
+        ("spread", "f8"),  # m, and what its gate reaches at once
         ("level", "i8"),
         ("dense", "?"),  # it was born in dense clutter
         ("claims", "?"),  # it has plots in its gate
@@ -185,6 +189,7 @@ PARAMETERS = np.dtype(
         ("initiation", "i8"),  # AUTO, ...
         ("identity", "?"),  # codes and addresses are evidence
         ("max_tracks", "i8"),
+        ("log_miss", "f8"),  # log-likelihood ratio of a pass without a plot
         ("turn", "f8"),  # s, nominal time of a turn of the antenna
         ("filter", "i8"),  # KALMAN, EXTENDED, ...
         ("proposal", "i8"),  # PRIOR, OPTIMAL, ADAPTED
@@ -264,8 +269,9 @@ SWEPT_COUNTS = (
     N_PHASE,
     N_PAST,
     N_NEXT_BIN,  # its unwrapped number
-) = range(13)
-SIZES = 13
+    N_NEXT_PAGE,  # and that in the turn
+) = range(14)
+SIZES = 14
 
 
 # Columns of a confirmed track's whereabouts: when it was born; time, position and velocity; a quadratic
@@ -303,6 +309,6 @@ class World(NamedTuple):
     mixture: NDArray[np.float64]  # scratch: `kalman.MIXTURE`
     members: Any  # MEMBER table
     pairs: Any  # PAIR table
-    relative: NDArray[np.float32]  # (pairs, N) what `filters.log_likelihood` gave
+    relative: NDArray[np.float32]  # (pairs, 2, N) what `filters.log_likelihood` gave
     belief: Belief
     need: NDArray[np.int64]  # (SIZES,) of the bin that did not fit

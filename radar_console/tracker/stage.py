@@ -20,10 +20,10 @@ from radar_console.estimation.gaussian import Array
 from radar_console.estimation.kalman import MIXTURE
 from radar_console.estimation.particle import normals
 from radar_console.scenario import TrackerSettings
-from radar_console.tracker import cloud, clutter, gating, modes
+from radar_console.tracker import agenda, cloud, clutter, gating, modes
 from radar_console.tracker.association.choose import KINDS
 from radar_console.tracker.clusters import associate, step, weigh
-from radar_console.tracker.intake import bins, merge, take
+from radar_console.tracker.intake import HUGE, bins, merge, take
 from radar_console.tracker.management import adopt
 from radar_console.tracker.records import (
     BEAM,
@@ -32,7 +32,6 @@ from radar_console.tracker.records import (
     MEMBER,
     N_EDGES,
     N_MEMBERS,
-    N_NEXT_BIN,
     N_PAIRS,
     N_PAST,
     N_POOL,
@@ -67,7 +66,6 @@ _LEAST_SHARE = 4  # members for each thread
 _CLIMB_NOISE = 1.0  # m²/s³, of the rate of climb
 _LOG = 2048  # sectors that are remembered, to find where the beam was
 _FEW_TURNS = 4
-_HUGE = 1e12  # s, rad and m: no sector's
 
 
 @dataclass(slots=True)
@@ -145,7 +143,7 @@ class Tracker:
         self._log.append(sector)
         if self._next_bin is None:
             self._next_bin = math.floor(self._log.angle[0] / self._bin) + 1
-            self._world.books.size[N_NEXT_BIN] = self._next_bin
+            agenda.open_at(self._next_bin, self._world.books)
             self._world.clutter["last"] = math.floor(self._log.angle[0] / TURN * clutter.COLUMNS)
         self._skip_long_gap()
         if len(sector.centroids):
@@ -295,7 +293,7 @@ class Tracker:
 def _sound(sector: Sector) -> bool:
     """Time, angle and position are such as can be; the beam made a few turns at most."""
     numbers = (sector.start, sector.stop, sector.begin, sector.end, sector.complete, *sector.position)
-    possible = all(abs(number) <= _HUGE for number in numbers)  # False for NaN
+    possible = all(abs(number) <= HUGE for number in numbers)  # False for NaN
     return possible and sector.end - sector.begin <= _FEW_TURNS * TURN
 
 
@@ -403,6 +401,7 @@ def _parameters(settings: TrackerSettings, radar: Radar, seed: int) -> NDArray[n
         "initiation": _INITIATIONS.index(settings.initiation),
         "identity": settings.identity == "use",
         "max_tracks": settings.max_tracks,
+        "log_miss": math.log(max(1.0 - settings.p_d * settings.gate_probability, 1e-300)),
         "turn": radar.rotation,
         "filter": _FILTERS.index(settings.filter),
         "proposal": _PROPOSALS.index(settings.proposal),
@@ -466,7 +465,7 @@ def _empty_world(settings: TrackerSettings, radar: Radar, seed: int) -> World:
         mixture=np.zeros(MIXTURE),
         members=np.zeros(64, MEMBER),
         pairs=np.zeros(64, PAIR),
-        relative=np.zeros((64, count), np.float32),
+        relative=np.zeros((64, 2, count), np.float32),
         belief=belief,
         need=np.zeros(SIZES, np.int64),
     )

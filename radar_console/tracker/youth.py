@@ -231,7 +231,7 @@ def _settle_branching(index: int, beam: Any, w: World) -> None:
                 _branch(index, k, NO, beam, w)
             k = edges[k].next
         track.voiced = False
-    track.score += math.log(max(miss, 1e-300))
+    track.score += par.log_miss
     lost = track.score < track.peak - _DROP
     if track.level == STARTER:
         lost = taken and _branches(track, par)

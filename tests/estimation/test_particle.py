@@ -51,12 +51,12 @@ def test_weigh_is_the_density_of_the_whole_measurement(doppler, outliers):
     """To the rounding of single precision in a sum of 500 terms of d²/2 up to 80: 1e-5."""
     cloud, weights = some_cloud(500)
     z, r = measurement(), RATE_VARIANCE if doppler else math.inf
-    g = np.zeros(500)
-    for part, scale in ((1.0 - outliers, 1.0), (outliers, particle.BROAD)):
+    g = np.empty((2, 500))
+    for part, (share, scale) in enumerate(((1.0 - outliers, 1.0), (outliers, particle.BROAD))):
         _, H, B = joint(scale, doppler)
         nu = z[: len(H)].astype(float) - (H @ cloud.astype(float)).T
-        g += part * np.exp(log_density(nu, B))
-    relative = np.empty(500, np.float32)
+        g[part] = share * np.exp(log_density(nu, B))
+    relative = np.empty((2, 500), np.float32)
     found, total = particle.weigh(cloud, weights, S, z, PACKED, r, outliers, relative)
     assert found == pytest.approx(math.log(np.sum(weights * g)), abs=2e-5)
     assert np.allclose(relative / relative.sum(), g / g.sum(), rtol=1e-4, atol=1e-9)
@@ -67,7 +67,7 @@ def test_weigh_is_the_density_of_the_whole_measurement(doppler, outliers):
 @pytest.mark.parametrize("distance", [1e3, 1e6, 1e9])
 def test_a_measurement_far_out_does_not_underflow(outliers, distance):
     cloud, weights = some_cloud(100)
-    relative = np.empty(100, np.float32)
+    relative = np.empty((2, 100), np.float32)
     found, total = particle.weigh(
         cloud, weights, np.zeros((2, 2)), measurement(a=distance), PACKED, math.inf, outliers, relative
     )
@@ -129,26 +129,6 @@ def test_with_nothing_open_a_proposal_moves_nothing():
     particle.condition_on_nothing(np.zeros((2, 2)), 0.0, 0.0, terms)
     particle.propose(cloud, 0, 50, np.zeros(MEASURED, np.float32), terms, noise, out)
     assert np.array_equal(out, cloud)
-
-
-def test_outliers_are_found_as_often_as_they_are():
-    """Share of the broad density at one place, over 100,000 lots; 4.5 standard errors."""
-    count, z, epsilon = 100_000, measurement(a=120.0), 0.1
-    parents = np.zeros((4, count), np.float32)
-    near, far = np.empty(TERMS, np.float32), np.empty(TERMS, np.float32)
-    log_near = particle.condition(S, z, PACKED, math.inf, 1.0, 0.0, 0.0, near)
-    log_far = particle.condition(S, z, PACKED, math.inf, particle.BROAD, 0.0, 0.0, far)
-    uniform, found = np.empty(count, np.float32), np.zeros(count, np.bool_)
-    draws.uniforms(key(2, 2, 2), uniform)
-    log_odds = math.log((1.0 - epsilon) / epsilon) + log_near - log_far
-    particle.are_outliers(parents, 0, count, z, near, far, log_odds, uniform, found)
-    g = [
-        part * math.exp(log_density(z[:2].astype(float), joint(scale, False)[2]))
-        for part, scale in ((1.0 - epsilon, 1.0), (epsilon, particle.BROAD))
-    ]
-    p = g[1] / sum(g)
-    assert 0.1 < p < 0.9
-    assert abs(found.mean() - p) < 4.5 * math.sqrt(p * (1.0 - p) / count)
 
 
 def test_the_rest_grows_and_is_drawn():

@@ -40,7 +40,7 @@ class Cloud:
         cloud.advance(self.tracks[i], t, self.par, self.belief)
 
     def weigh(self, pool, i=0):
-        relative = np.empty((len(pool), self.belief.weights.shape[1]), np.float32)
+        relative = np.empty((len(pool), 2, self.belief.weights.shape[1]), np.float32)
         found = [
             cloud.log_likelihood(self.tracks[i], plot, self.par, self.belief, relative[j])
             for j, plot in enumerate(pool)

@@ -287,6 +287,7 @@ def test_times_far_from_the_sectors(time):
     rows, counts = run(three_targets(time=time))
     assert sound(rows)
     assert counts.centroids == 30
+    assert counts.invalid == (30 if abs(time) > 1e12 else 0)
 
 
 def test_a_centroid_below_the_watermark_is_late():
