@@ -190,6 +190,9 @@ def sparse_cases(seed: int) -> Iterator[tuple[str, Pairs]]:
         pairs(150_000, 150_001, chain[:300_000], chain[:300_000] + np.arange(300_000) % 2, rng),
     )
     yield "250,000 tracks, 2 of a million plots each", at_random(250_000, 1_000_000, 2, rng)
+    # As many tracks as the tracker has room for, and fewer with more plots each.
+    for tracks, each in ((50_000, 20), (10_000, 100), (1000, 1000)):
+        yield f"{tracks:,} tracks, {each:,} of 100,000 plots each", at_random(tracks, 100_000, each, rng)
 
 
 def timed(call: Callable[[], Any], seconds: float) -> list[float]:

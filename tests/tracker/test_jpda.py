@@ -387,7 +387,10 @@ def test_many_small_clusters_in_any_order():
 
 @pytest.mark.parametrize("certain", [False, True])
 def test_one_sweep_over_all_is_what_it_is_over_each(certain):
-    """So many pairs that belief propagation goes over them once: the plain formulas of Williams and Lau."""
+    """So many pairs that belief propagation goes over them once: the plain formulas of Williams and Lau.
+
+    What plots hear is summed in single precision: an error of 1e-7 of that is one of 1e-7 of a probability.
+    """
     rng = np.random.default_rng(11)
     tracks, plots, many = 3, 4, 60_000
     w = np.exp(rng.normal(size=(many, tracks, plots)))
@@ -405,9 +408,9 @@ def test_one_sweep_over_all_is_what_it_is_over_each(certain):
     # The first track's own plot takes its share of what the others leave.
     rest = 1.0 - p[:, 0, 2:].sum(axis=1)
     p[:, 0, 1] = rest * r[:, 0, 1] / (1.0 + r[:, 0, 1])
-    np.testing.assert_allclose(found.p, p[w > 0], atol=1e-9)
+    np.testing.assert_allclose(found.p, p[w > 0], atol=5e-7)
     p_miss = 1.0 - p.sum(axis=2)
-    np.testing.assert_allclose(found.p_miss.reshape(many, tracks), p_miss, atol=1e-9)
+    np.testing.assert_allclose(found.p_miss.reshape(many, tracks), p_miss, atol=5e-7)
 
 
 def test_a_hopeless_cluster_leaves_nothing_for_the_next():

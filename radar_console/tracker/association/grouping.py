@@ -45,8 +45,9 @@ def count_claims(col: Ints, columns: int) -> tuple[Claims, int]:
     """(columns,) the pairs of each plot, at most 255; and the pairs of plots that have several."""
     claims, shared = np.zeros(columns, np.uint8), 0
     for k in range(col.size):
-        n = claims[col[k]]
-        claims[col[k]] = n + (n < _MANY)
+        c = np.uint64(col[k])  # else numba looks whether it counts from the end
+        n = claims[c]
+        claims[c] = n + (n < _MANY)
         shared += (n > 0) + (n == 1)
     return claims, shared
 

@@ -258,8 +258,8 @@ def _set_apart(every: Side, claims: Claims, p_miss: Array, approximate: Any) -> 
     sharing = 0
     for t in range(approximate.size):
         k, end, free = every.start[t], every.start[t + 1], 1.0
-        while k < end and claims[every.other[k]] == 1:
-            free += every.ratio[k]
+        while k < end and claims[np.uint64(every.other[np.uint64(k)])] == 1:  # see `propagation`
+            free += every.ratio[np.uint64(k)]
             k += 1
         approximate[t] = k < end
         sharing += k < end

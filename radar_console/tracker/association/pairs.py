@@ -62,11 +62,15 @@ def divide(miss: Array, start: Ints, w: Array, ratio: Array) -> None:
         begin, end, m = start[t], start[t + 1], miss[t]
         largest = m
         if end - begin <= SHORT:
-            for k in range(begin, end):
+            first, stop = np.uint64(begin), np.uint64(end)  # else numba looks whether they count from the end
+            for k in range(first, stop):
                 largest = max(largest, w[k])
-            certain = m <= LEAST_MISS * largest
-            for k in range(begin, end):
-                ratio[k] = w[k] / m if not certain else _certain(w[k], largest)
+            if m > LEAST_MISS * largest:
+                for k in range(first, stop):
+                    ratio[k] = w[k] / m
+            else:
+                for k in range(first, stop):
+                    ratio[k] = _certain(w[k], largest)
             continue
         gate, r = w[begin:end], ratio[begin:end]
         for k in range(r.size):
