@@ -187,16 +187,17 @@ def _settle(t: int, tracks: Side, used: Array, claims: Claims, folded: bool, p_m
     """
     start, c, r = tracks
     begin, end = np.uint64(start[t]), np.uint64(start[t + 1])
-    lost, own = 0.0, p_miss[t]
+    lost = 0.0
     for k in range(begin, end):
-        j = np.uint64(c[k])
-        p = r[k] * used[j]
+        p = r[k] * used[np.uint64(c[k])]
         lost += r[k] - p
         r[k] = p
-        own += p if claims[j] == 1 else 0.0
     if not folded:
         p_miss[t] += lost
         return
+    own = p_miss[t]
+    for k in range(begin, end):
+        own += r[k] if claims[np.uint64(c[k])] == 1 else 0.0
     more = 1.0 + lost / own
     p_miss[t] *= more
     for k in range(begin, end):
