@@ -11,13 +11,13 @@ from radar_console.tracker import agenda, clutter, filters, gating, height, iden
 from radar_console.tracker.kernels import bare, inlined, owning
 from radar_console.tracker.records import (
     AUTO,
-    B_BORN,
     B_CURVE,
     B_E,
     B_N,
     B_REACH,
     B_REACH_T,
     B_REACH_TT,
+    B_ROOT,
     B_T,
     B_V_E,
     B_V_N,
@@ -77,7 +77,7 @@ def begin(plot: Any, dense: bool, w: World) -> None:
     track, par = w.tracks[index], w.par
     w.books.size[N_TRACKS] += 1
     _enter(index, w.books)
-    track.id, track.born, track.t = plot.ordinal, plot.t, plot.t
+    track.id, track.root, track.born, track.t = plot.ordinal, plot.ordinal, plot.t, plot.t
     x, P = track.x, track.P
     x[0], x[1], x[2], x[3] = plot.e, plot.n, 0.0, 0.0
     for i in range(4):
@@ -169,8 +169,8 @@ def note(track: Any, books: Books) -> None:
     forecast adds, √(g T³), is no more than √g (T + T²) / 2.
     """
     x, P, curve, growth, row = track.x, track.P, track.curve, track.growth, books.whereabouts[track.slot]
-    row[B_BORN], row[B_T], row[B_E], row[B_N], row[B_V_E], row[B_V_N] = (
-        track.born,
+    row[B_ROOT], row[B_T], row[B_E], row[B_N], row[B_V_E], row[B_V_N] = (
+        track.root,
         track.t,
         x[0],
         x[1],

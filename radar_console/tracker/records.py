@@ -55,6 +55,7 @@ STATE = np.dtype(
         ("hits", "i8"),
         ("id", "i8"),  # ordinal of its first plot
         ("born", "f8"),  # s, time of its first plot
+        ("root", "i8"),  # ordinal of its first plot: branches have it in common; -1 of one from elsewhere
         ("up", "f8", (2,)),  # m and m/s, height and its rate at `up_t`; NaN unknown
         ("up_P", "f8", (3,)),  # their covariance pp, pv, vv
         ("up_t", "f8"),  # s, of the height
@@ -274,9 +275,9 @@ SWEPT_COUNTS = (
 SIZES = 14
 
 
-# Columns of a confirmed track's whereabouts: when it was born; time, position and velocity; a quadratic
+# Columns of a confirmed track's whereabouts: its first plot; time, position and velocity; a quadratic
 # of the time since then that bounds its deviation; and half its acceleration.
-B_BORN, B_T, B_E, B_N, B_V_E, B_V_N, B_REACH, B_REACH_T, B_REACH_TT, B_CURVE = range(10)
+B_ROOT, B_T, B_E, B_N, B_V_E, B_V_N, B_REACH, B_REACH_T, B_REACH_TT, B_CURVE = range(10)
 WHEREABOUTS = 10
 
 

@@ -29,7 +29,7 @@ from radar_console.tracker import agenda, clusters, clutter, gating, height, man
 from radar_console.tracker.kernels import bare, inlined, owning
 from radar_console.tracker.records import (
     AUTO,
-    B_BORN,
+    B_ROOT,
     BRANCHING,
     C_CAPPED,
     C_EXTENDED,
@@ -386,13 +386,13 @@ def _is_known(track: Any, w: World) -> bool:
     """
     spread = math.sqrt(track.P[0, 0] + track.P[1, 1])
     for slot in range(w.books.size[N_SLOTS]):
-        kin = w.books.whereabouts[slot, B_BORN] == track.born
+        kin = w.books.whereabouts[slot, B_ROOT] == track.root
         if not kin and not _may_be_near(slot, track, spread, _SIGMAS_APART, w.books):
             continue
         other = w.tracks[w.belief.owner[slot]]
         if other.dead:
             continue
-        if other.born == track.born:
+        if other.root == track.root:
             if track.score < other.peak + _DROP:
                 return True
             continue
@@ -409,7 +409,7 @@ def _kin(track: Any, w: World) -> int:
     """The confirmed track from the same first plot as a young branch; -1 none."""
     if track.level != CONFIRMED and _branches(track, w.par):
         for slot in range(w.books.size[N_SLOTS]):
-            if w.books.whereabouts[slot, B_BORN] == track.born and not w.tracks[w.belief.owner[slot]].dead:
+            if w.books.whereabouts[slot, B_ROOT] == track.root and not w.tracks[w.belief.owner[slot]].dead:
                 return int(w.belief.owner[slot])
     return -1
 
@@ -421,9 +421,16 @@ def _succeed(index: int, known: int, w: World) -> None:
     if track.voiced:
         _report(track, _DELETED, NO, NO, w.pool[0], math.nan, NO, track.t, w.par, w.books)
         w.books.tally[C_MERGED] += 1
-    track.id, track.born, track.voiced, other.voiced = other.id, other.born, True, False
+    _take_name(track, other)
+    other.voiced = False
     _kill(other, known, w.books)
     w.books.tally[C_LOST] += 1
+
+
+@bare
+def _take_name(track: Any, other: Any) -> None:
+    """Go on under the other track's number, and its birth."""
+    track.id, track.root, track.born, track.voiced = other.id, other.root, other.born, True
 
 
 @bare
@@ -461,7 +468,8 @@ def _pool(ends: Any, w: World) -> None:
             a = w.tracks[kept[into]]
             _blend(a, b)
             if b.voiced and not a.voiced:
-                a.id, a.born, a.voiced, b.voiced = b.id, b.born, True, False
+                _take_name(a, b)
+                b.voiced = False
         elif m < _MOST_ENDS:
             kept[m] = index[k]
             _root(b.P, roots[m])
@@ -522,21 +530,21 @@ def _before(a: int, b: int, w: World) -> bool:
 @bare
 def _absorb(stays: int, ends: Any, same: bool, w: World) -> None:
     """Have one track speak for the young ones that end on its plot; `same`: and have its last but one."""
-    a, heir, born = w.tracks[stays], -1, 0.0
+    a, heir = w.tracks[stays], -1
     for index in ends:
         b = w.tracks[index]
         if index == stays or b.dead or b.level == CONFIRMED or (same and b.previous != a.previous):
             continue
-        if b.voiced and not a.voiced and (heir < 0 or b.id < heir):
-            heir, born = b.id, b.born
+        if b.voiced and not a.voiced and (heir < 0 or b.id < w.tracks[heir].id):
+            heir = index
     for index in ends:
         b = w.tracks[index]
         if index == stays or b.dead or b.level == CONFIRMED or (same and b.previous != a.previous):
             continue
-        b.voiced &= b.id != heir
+        b.voiced &= index != heir
         _drop(index, w)
     if heir >= 0:
-        a.id, a.born, a.voiced = heir, born, True
+        _take_name(a, w.tracks[heir])
 
 
 @bare

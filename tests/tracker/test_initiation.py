@@ -154,6 +154,18 @@ def test_targets_are_found_by_every_initiation(initiation):
 
 
 @pytest.mark.parametrize("initiation", MODES)
+def test_targets_first_seen_at_the_same_time(initiation):
+    """Some recordings have one time for all plots of a turn: that makes nobody another one's branch."""
+    turns = [
+        one_turn(table_of(4.0 * k + 1.0, [5e4, 8e4, 3e4], [1.5, 3.0, 4.5], 3 * k), k) for k in range(12)
+    ]
+    rows, counts = run(turns, initiation=initiation)
+    assert counts.confirmed == 3
+    first = [of_track(rows, track)["status"].tolist().index(TrackStatus.CONFIRMED) for track in (0, 1, 2)]
+    assert first[0] == first[1] == first[2]
+
+
+@pytest.mark.parametrize("initiation", MODES)
 def test_tracks_with_the_same_plots_become_one(initiation):
     """A target that gives two plots a turn, side by side, ends up in no more than two tracks."""
     sectors = [
@@ -337,7 +349,7 @@ def test_evidence_that_is_needed_to_take_over():
     for lead, waits in ((4.5, True), (4.7, False)):
         branch["score"] = world.tracks[0]["peak"] + lead
         assert youth._is_known(branch, world) == waits
-    branch["born"] += 4.0
+    branch["root"] += 1
     assert youth._is_known(branch, world)
 
 
