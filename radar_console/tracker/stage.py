@@ -182,7 +182,8 @@ class Tracker:
         azimuth = np.arctan2(tracks["east"] - east, tracks["north"] - north)
         rows["psi"] = beam - np.mod(beam - azimuth, TURN)
         rows["u_e"], rows["u_n"] = np.sin(azimuth), np.cos(azimuth)
-        rows["root"] = rows["last"] = rows["previous"] = rows["first"] = rows["mode_3a"] = rows["address"] = -1
+        for name in ("root", "last", "previous", "first", "mode_3a", "address"):
+            rows[name] = -1
         rows["hits"] = rows["passes"] = self.settings.confirm_hits
         rows["history"], rows["voiced"] = 1, True
         for k in range(len(tracks)):
