@@ -156,9 +156,7 @@ def test_targets_are_found_by_every_initiation(initiation):
 @pytest.mark.parametrize("initiation", MODES)
 def test_targets_first_seen_at_the_same_time(initiation):
     """Some recordings have one time for all plots of a turn: that makes nobody another one's branch."""
-    turns = [
-        one_turn(table_of(4.0 * k + 1.0, [5e4, 8e4, 3e4], [1.5, 3.0, 4.5], 3 * k), k) for k in range(12)
-    ]
+    turns = [one_turn(table_of(4.0 * k + 1.0, [5e4, 8e4, 3e4], [1.5, 3.0, 4.5], 3 * k), k) for k in range(12)]
     rows, counts = run(turns, initiation=initiation)
     assert counts.confirmed == 3
     first = [of_track(rows, track)["status"].tolist().index(TrackStatus.CONFIRMED) for track in (0, 1, 2)]
