@@ -9,15 +9,9 @@ import math
 from typing import Any
 
 from radar_console.tracker.kernels import bare
-from radar_console.tracker.records import N_NEXT_BIN, N_NEXT_PAGE, N_TRACKS, Books
+from radar_console.tracker.records import N_NEXT_BIN, N_TRACKS, Books
 
 _NEVER = math.inf
-
-
-@bare
-def open_at(number: int, books: Books) -> None:
-    """Have the next bin be that of the unwrapped `number`."""
-    books.size[N_NEXT_BIN], books.size[N_NEXT_PAGE] = number, number % books.pages.size
 
 
 @bare
@@ -30,7 +24,7 @@ def enter(index: int, books: Books) -> None:
 @bare
 def at_once(index: int, books: Books) -> None:
     """Have the track looked at in the next bin."""
-    _put(index, books.size[N_NEXT_PAGE], books)
+    _put(index, books.size[N_NEXT_BIN], books)
     books.agenda[index].time = _NEVER
 
 
@@ -38,7 +32,7 @@ def at_once(index: int, books: Books) -> None:
 def rest(index: int, angle: float, time: float, width: float, books: Books) -> None:
     """Let the track be until the beam is at `angle`, or the clock at `time`; bins are `width` rad wide."""
     number = max(math.ceil(angle / width), books.size[N_NEXT_BIN])
-    _put(index, number % books.pages.size, books)
+    _put(index, number, books)
     books.agenda[index].time = time
     books.alarm[0] = min(books.alarm[0], time)
 
@@ -50,11 +44,11 @@ def turn_page(beam: Any, width: float, books: Books) -> int:
     The list is the caller's, who takes one after the other off with `tear`.
     """
     number = round(beam.phi / width)
-    open_at(number, books)
-    page = books.size[N_NEXT_PAGE]
+    books.size[N_NEXT_BIN] = number
     if beam.t >= books.alarm[0]:
         _ring(beam.t, books)
-    open_at(number + 1, books)
+    books.size[N_NEXT_BIN] = number + 1
+    page = number % books.pages.size
     first = books.pages[page]
     books.pages[page] = -1
     return int(first)
@@ -80,9 +74,9 @@ def _ring(now: float, books: Books) -> None:
 
 
 @bare
-def _put(index: int, page: int, books: Books) -> None:
+def _put(index: int, number: int, books: Books) -> None:
     leave(index, books)
-    entry = books.agenda[index]
+    page, entry = number % books.pages.size, books.agenda[index]
     entry.bin, entry.before, entry.after = page, -1, books.pages[page]
     if entry.after >= 0:
         books.agenda[entry.after].before = index

@@ -170,11 +170,8 @@ def resting(track: Any, beam: Any, par: Any) -> tuple[float, float]:
 
 
 @bare
-def drift(track: Any, lag: float, par: Any) -> float:
-    """How far the track's gate can move, or a starter's grow, in `lag` s, m."""
-    if track.level == STARTER:
-        growth: float = lag * par.max_speed
-        return growth
+def drift(track: Any, lag: float) -> float:
+    """How far the track's gate can move in `lag` s, m."""
     x, P = track.x, track.P
     speed: float = math.sqrt(x[2] * x[2] + x[3] * x[3]) + _SURE_SIGMAS * math.sqrt(P[2, 2] + P[3, 3])
     return lag * speed

@@ -223,8 +223,9 @@ def _keep(track: Any, index: int, hit: bool, par: Any, books: Books) -> int:
 def _judge(track: Any, index: int, hit: bool, par: Any, books: Books) -> int:
     """Find a young track proven, or delete it; its status after this pass."""
     track.peak = max(track.peak, track.score)
-    fast = track.level == TENTATIVE and _too_fast(track, par)
-    ripe = track.level == TENTATIVE and hit and track.hits >= _LEAST_HITS
+    moves = track.level == TENTATIVE
+    fast = moves and _too_fast(track, par)
+    ripe = moves and hit and track.hits >= _LEAST_HITS
     track.proven = ripe and not fast and _proven(track, par)
     if not track.proven and (fast or _hopeless(track, par)):
         kill(track, index, books)

@@ -270,9 +270,8 @@ SWEPT_COUNTS = (
     N_PHASE,
     N_PAST,
     N_NEXT_BIN,  # its unwrapped number
-    N_NEXT_PAGE,  # and that in the turn
-) = range(14)
-SIZES = 14
+) = range(13)
+SIZES = 13
 
 
 # Columns of a confirmed track's whereabouts: its first plot; time, position and velocity; a quadratic

@@ -20,7 +20,7 @@ from radar_console.estimation.gaussian import Array
 from radar_console.estimation.kalman import MIXTURE
 from radar_console.estimation.particle import normals
 from radar_console.scenario import TrackerSettings
-from radar_console.tracker import agenda, cloud, clutter, gating, modes
+from radar_console.tracker import cloud, clutter, gating, modes
 from radar_console.tracker.association.choose import KINDS
 from radar_console.tracker.clusters import associate, step, weigh
 from radar_console.tracker.intake import HUGE, bins, merge, take
@@ -32,6 +32,7 @@ from radar_console.tracker.records import (
     MEMBER,
     N_EDGES,
     N_MEMBERS,
+    N_NEXT_BIN,
     N_PAIRS,
     N_PAST,
     N_POOL,
@@ -143,7 +144,7 @@ class Tracker:
         self._log.append(sector)
         if self._next_bin is None:
             self._next_bin = math.floor(self._log.angle[0] / self._bin) + 1
-            agenda.open_at(self._next_bin, self._world.books)
+            self._world.books.size[N_NEXT_BIN] = self._next_bin
             self._world.clutter["last"] = math.floor(self._log.angle[0] / TURN * clutter.COLUMNS)
         self._skip_long_gap()
         if len(sector.centroids):

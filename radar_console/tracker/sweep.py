@@ -184,7 +184,7 @@ def _join(fresh: Any, beam: Any, w: World) -> int:
         track = w.tracks[index]
         if track.swept:
             continue
-        r, along = track.range, track.along + _drift(track, lag, par)
+        r, along = track.range, track.along + _drift(track, lag)
         i = np.searchsorted(distance, r - along)
         while i < n and distance[i] <= r + along:
             plot = fresh[by_range[i]]

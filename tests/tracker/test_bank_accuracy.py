@@ -12,6 +12,7 @@ from radar_console.tracker import modes
 T = RADAR.rotation
 RUNS, STEPS = 100, 30
 P0 = np.diag([100.0**2, 100.0**2, 15.0**2, 15.0**2])
+MATCHED = {"outliers": 0.0, "gate_probability": 0.9999}
 
 
 def own_components(par, k, n):
@@ -58,7 +59,7 @@ def errors(name, doppler=False, seed=1, **changes):
     rng = np.random.default_rng(seed)
     nees, nis = np.empty((RUNS, STEPS)), np.empty((RUNS, STEPS))
     for run in range(RUNS):
-        solo = Solo(**({"outliers": 0.0, "gate_probability": 0.9999} | FILTERS[name] | changes))
+        solo = Solo(**(MATCHED | FILTERS[name] | changes))
         truth = matched(rng, solo.par, solo.x.shape[1])
         solo.start(truth[0, :4] + np.sqrt(np.diag(P0)) * rng.normal(size=4), P0)
         for k in range(STEPS):
@@ -123,9 +124,7 @@ def flights(name, kind, runs=30, seed=3, **changes):
     squares, within, outside = [], [], []
     for _ in range(runs):
         truth, begin = manoeuvring(rng, kind)
-        solo = Solo(**({"outliers": 0.0, "gate_probability": 0.9999} | FILTERS[name] | changes)).start(
-            truth[0], P0
-        )
+        solo = Solo(**(MATCHED | FILTERS[name] | changes)).start(truth[0], P0)
         for k in range(1, len(truth)):
             plot = seen(rng, T * k, truth[k])
             d2 = distance(solo.advance(T * k), plot[0])

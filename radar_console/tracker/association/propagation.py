@@ -4,7 +4,7 @@ Source: Williams and Lau, Approximate evaluation of marginal association probabi
 propagation, IEEE T-AES 50(4), 2014, (24)-(26); it always converges (their theorem 1).
 
 Where a million pairs come one by one indices are unsigned: numba looks at others whether they count from the
-end, and what is done to a pair otherwise costs less than a mistaken branch.
+end.
 """
 
 from typing import Any, NamedTuple
@@ -195,7 +195,7 @@ def _settle(t: int, tracks: Side, used: Array, claims: Claims, folded: bool, p_m
     if not folded:
         p_miss[t] += lost
         return
-    own = p_miss[t]
+    own = p_miss[t]  # also where nothing was lost: a mistaken branch costs more
     for k in range(begin, end):
         own += r[k] if claims[np.uint64(c[k])] == 1 else 0.0
     more = 1.0 + lost / own
